@@ -198,7 +198,7 @@ fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Resu
     if let Some(output) = output {
         write::write_content(output, content)?;
     }
-    Ok(content.bytes().into_owned())
+    Ok(content.bytes()?.into_owned())
 }
 
 /// Compiles a scene: pairs of positions and triangles, for each instance its mesh and the 3×4

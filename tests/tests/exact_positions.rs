@@ -82,7 +82,7 @@ fn models_and_arrays_in_f64_give_the_same_file_with_all_their_digits() {
     let cache = bth_compile::cached::Cache::none();
     let scene =
         memory::compile_scene(&[mesh], &[instance], &options(Positions::Auto), &cache, &Silent).unwrap();
-    assert_exact(&scene.content.unwrap().bytes(), &positions, &triangles);
+    assert_exact(&scene.content.unwrap().bytes().unwrap(), &positions, &triangles);
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn positions_that_are_kept_by_the_cache_come_back() {
         let cache = bth_compile::cached::Cache::new(&store, "far");
         let compiled =
             bth_compile::pipeline::compile_cached(path, options, &cache, &|_| true, &Silent).unwrap();
-        (compiled.content.unwrap().bytes().into_owned(), compiled.built.is_none())
+        (compiled.content.unwrap().bytes().unwrap().into_owned(), compiled.built.is_none())
     };
     let (first, was_cached) = run(&path, &options(Positions::Auto));
     assert!(!was_cached);

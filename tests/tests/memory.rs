@@ -90,7 +90,7 @@ fn the_cache_answers_the_second_time() {
     assert!(first.built.is_some() && second.built.is_none());
     for outcome in [first, second] {
         let content = outcome.content.expect("the content was asked for");
-        assert_eq!(content.bytes(), expected.bytes.as_slice());
+        assert_eq!(content.bytes().unwrap(), expected.bytes.as_slice());
     }
     let mut other = model;
     other.positions[7][1] += 0.5;
@@ -157,7 +157,7 @@ fn a_scene_is_that_of_a_manifest() {
         let outcome =
             memory::compile_scene(&meshes, &instances, &options, &cache, &Silent).expect("it compiles");
         let content = outcome.content.expect("the content was asked for");
-        let bytes = content.bytes();
+        let bytes = content.bytes().unwrap();
         assert_same(&bytes, &of_files.bytes, "a scene");
     }
     let scene = memory::open_scene(&meshes, &instances, &options, &Silent).expect("it opens");

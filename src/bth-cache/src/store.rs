@@ -4,11 +4,11 @@ use crate::evict::{Evicted, evict};
 use crate::files::{Files, named, remove, touch};
 use crate::lock::{WorkLock, same_file};
 use crate::{Digest, Key, Record, Remote, Statistics, last_keys};
-use bth_files::{create_folders, write_once};
+use bth_files::{create_folders, write_once_by};
 use serde_json::Value;
 use std::collections::HashSet;
 use std::fs::File;
-use std::io::{ErrorKind, Result};
+use std::io::{ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -41,7 +41,8 @@ pub struct Store {
 pub struct Pin {
     /// The file, which is never written to again.
     pub path: PathBuf,
-    _file: File,
+    /// The same file, open for reading.
+    pub file: File,
 }
 
 impl Store {
@@ -98,7 +99,7 @@ impl Store {
             let text = self.fetch(&name("keys", id))?;
             match Record::from_text(&text, id) {
                 Ok(record) => {
-                    let _ = self.write(&self.files.key(id), &text);
+                    let _ = self.write(&self.files.key(id), &|out| out.write_all(&text));
                     Some(record)
                 }
                 Err(why) => {
@@ -138,7 +139,7 @@ impl Store {
         }
         lock(&self.statistics).shared_hits += 1;
         // The bytes can be used even if they cannot be kept.
-        let _ = self.write(&path, &bytes);
+        let _ = self.write(&path, &|out| out.write_all(&bytes));
         Some(bytes)
     }
 
@@ -176,7 +177,7 @@ impl Store {
                     match Digest::of_reader(&file) {
                         Ok((digest, _)) if digest == record.blob => {
                             touch(&path);
-                            return Some(Pin { path, _file: file });
+                            return Some(Pin { path, file });
                         }
                         _ => self.drop_damaged(&path, OTHER_HASH),
                     }
@@ -209,10 +210,31 @@ impl Store {
     /// # Errors
     /// When it cannot be written; the store is then as it was.
     pub fn put(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
-        let (record, text) = self.put_both(key, bytes, report)?;
-        let there = name("blobs", &record.blob);
-        let is_damaged = lock(&self.damaged_there).remove(&there);
-        self.share(&there, bytes, is_damaged);
+        self.put_written(key, &|out| out.write_all(bytes), report)
+    }
+
+    /// Keeps what `write` writes under a key. It is called more than once, so that the content need
+    /// not be in memory, but for a shared store.
+    ///
+    /// # Errors
+    /// Those of `write`, or when it cannot be written; the store is then as it was.
+    pub fn put_written(
+        &self,
+        key: &Key,
+        write: &dyn Fn(&mut dyn Write) -> Result<()>,
+        report: Value,
+    ) -> Result<Record> {
+        let (blob, bytes) = Digest::of_written(write)?;
+        let record = Record { key: key.clone(), blob, bytes, whole: true, report };
+        self.put_content(&record, write)?;
+        let text = self.put_record(&record)?;
+        if lock(&self.remote).is_some() {
+            let there = name("blobs", &record.blob);
+            let is_damaged = lock(&self.damaged_there).remove(&there);
+            let mut content = Vec::new();
+            write(&mut content)?;
+            self.share(&there, &content, is_damaged);
+        }
         self.share(&name("keys", &key.id()), text.as_bytes(), true);
         Ok(record)
     }
@@ -229,22 +251,14 @@ impl Store {
         Ok(record)
     }
 
-    fn put_both(&self, key: &Key, bytes: &[u8], report: Value) -> Result<(Record, String)> {
-        let (blob, length) = (Digest::of(bytes), bytes.len() as u64);
-        let record = Record { key: key.clone(), blob, bytes: length, whole: true, report };
-        self.put_content(&record, bytes)?;
-        let text = self.put_record(&record)?;
-        Ok((record, text))
-    }
-
-    fn put_content(&self, record: &Record, bytes: &[u8]) -> Result<()> {
+    fn put_content(&self, record: &Record, content: &dyn Fn(&mut dyn Write) -> Result<()>) -> Result<()> {
         let blob = self.files.blob(&record.blob);
-        let mut new = self.write(&blob, bytes)?;
+        let mut new = self.write(&blob, content)?;
         if !new {
             match File::open(&blob).and_then(Digest::of_reader) {
                 Ok((digest, _)) if digest == record.blob => {}
                 // It was evicted meanwhile.
-                Err(e) if e.kind() == ErrorKind::NotFound => new = self.write(&blob, bytes)?,
+                Err(e) if e.kind() == ErrorKind::NotFound => new = self.write(&blob, content)?,
                 found => {
                     match found {
                         Ok(_) => self.drop_damaged(&blob, OTHER_HASH),
@@ -254,7 +268,7 @@ impl Store {
                         }
                         Err(_) => self.drop_damaged(&blob, "it cannot be read"),
                     }
-                    new = self.write(&blob, bytes)?;
+                    new = self.write(&blob, content)?;
                     // Another process may have put it there.
                     let found = File::open(&blob).and_then(Digest::of_reader);
                     if !new && !found.is_ok_and(|(digest, _)| digest == record.blob) {
@@ -278,10 +292,11 @@ impl Store {
     fn put_record(&self, record: &Record) -> Result<String> {
         let (id, text) = (record.key.id(), record.to_text()?);
         let path = self.files.key(&id);
-        if !self.write(&path, text.as_bytes())? {
+        let write = || self.write(&path, &|out| out.write_all(text.as_bytes()));
+        if !write()? {
             // The content that it led to is gone, or was made a second time.
             remove(&path);
-            self.write(&path, text.as_bytes())?;
+            write()?;
         }
         self.written(text.len() as u64);
         Ok(text)
@@ -359,11 +374,11 @@ impl Store {
         let _ = statistics.append(&self.files);
     }
 
-    fn write(&self, path: &Path, bytes: &[u8]) -> Result<bool> {
-        match write_once(path, bytes) {
+    fn write(&self, path: &Path, content: &dyn Fn(&mut dyn Write) -> Result<()>) -> Result<bool> {
+        match write_once_by(path, content) {
             Err(e) if e.kind() == ErrorKind::NotFound => {
                 create_folders(&self.folder, path.parent().unwrap_or(Path::new(".")))?;
-                write_once(path, bytes)
+                write_once_by(path, content)
             }
             done => done,
         }

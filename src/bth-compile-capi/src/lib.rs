@@ -334,7 +334,7 @@ unsafe fn with_bytes<T: Sync>(
         let (content, report) =
             in_threads(options.threads, || Ok(compile(&input, &chosen, &cache, &monitor)?))?;
         let content = content.ok_or_else(|| Failure(ERROR_INTERNAL, "no content".into()))?;
-        Ok((content.bytes().into_owned(), report))
+        Ok((content.bytes()?.into_owned(), report))
     };
     let outcome = catch_unwind(AssertUnwindSafe(run))
         .unwrap_or_else(|_| Err(Failure(ERROR_INTERNAL, "internal error".to_owned())));

@@ -89,7 +89,7 @@ pub fn open_scene(
 fn opened(content: Content) -> Result<bth::Scene> {
     let scene = match content.file() {
         Some(file) => bth::from_file(file.clone()),
-        None => bth::from_bytes(&content.bytes()),
+        None => bth::from_bytes(&content.bytes()?),
     };
     scene.map_err(|e| Error::Internal { code: "BTH-X030", message: format!("the written file fails: {e}") })
 }

@@ -125,6 +125,6 @@ fn digest(path: &Path) -> Result<Digest> {
     read.map(|(digest, _)| digest).map_err(|e| cannot_read(path, &e))
 }
 
-fn cannot_read(path: &Path, error: &dyn std::fmt::Display) -> Error {
+pub(crate) fn cannot_read(path: &Path, error: &dyn std::fmt::Display) -> Error {
     Error::File { code: "BTH-O001", path: path.to_owned(), message: format!("cannot read: {error}") }
 }

@@ -207,7 +207,7 @@ fn open(
     }
     // The cache could not keep it, or has lost it meanwhile.
     let scene = match compiled.content {
-        Some(content) => bth::from_bytes(&content.bytes())?,
+        Some(content) => bth::from_bytes(&content.bytes()?)?,
         None => memory::open(mesh, options, build.monitor)?,
     };
     Ok((scene, None, was_cached))

@@ -73,11 +73,25 @@ pub fn replace(
 /// # Errors
 /// Those of the system.
 pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
+    write_once_by(path, &|out| out.write_all(bytes))
+}
+
+/// As [`write_once`], with what `write` writes.
+///
+/// # Errors
+/// Those of the system and of `write`.
+pub fn write_once_by(
+    path: &Path,
+    write: &dyn Fn(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<bool> {
     let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
         return Err(IoError::new(ErrorKind::InvalidInput, "not the name of a file"));
     };
     let (mut file, named) = create(folder, &prefix_of(name), 0o444)?;
-    file.write_all(bytes)?;
+    let mut out = BufWriter::with_capacity(1 << 20, &mut file);
+    write(&mut out)?;
+    out.flush()?;
+    drop(out);
     share(&file, folder, 0o4);
     let linked = match &named {
         None => link_to(&file, path),
@@ -91,6 +105,14 @@ pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
         Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
         Err(e) => Err(e),
     }
+}
+
+/// A file without a name in a folder, to write to and to read from. It is gone when it is closed.
+///
+/// # Errors
+/// Those of the system.
+pub fn nameless(folder: &Path) -> std::io::Result<File> {
+    create(folder, &prefix_of(OsStr::new("bth")), 0o600).map(|(file, _)| file)
 }
 
 /// Makes the folders of a path that are missing below `root`. Whoever may write to a folder may
@@ -161,7 +183,7 @@ fn prefix_of(name: &OsStr) -> OsString {
 /// A locked file to write to, and its name if it needs one.
 fn create(folder: &Path, prefix: &OsString, mode: u32) -> std::io::Result<(File, Option<Named>)> {
     let mut options = std::fs::OpenOptions::new();
-    options.write(true);
+    options.read(true).write(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
     #[cfg(not(unix))]

@@ -104,10 +104,14 @@ impl std::fmt::Display for Diagnosis {
 }
 
 impl From<&bth_format::Error> for Diagnosis {
-    /// Exit code 4 for a file that cannot be read, else 3.
+    /// Exit code 5 for a lack of memory, 4 for a file that cannot be read, else 3.
     fn from(error: &bth_format::Error) -> Self {
         let known = |text: &str| (!text.is_empty()).then(|| text.to_owned());
-        let exit_code = if error.code() == bth_format::Code::Read { 4 } else { 3 };
+        let exit_code = match error.code() {
+            _ if error.is_of_memory() => 5,
+            bth_format::Code::Read => 4,
+            _ => 3,
+        };
         Self {
             place: error.path().map(|path| path.to_string_lossy().into_owned()),
             byte: error.offset(),

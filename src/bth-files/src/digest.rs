@@ -1,7 +1,7 @@
 //! BLAKE3 of contents.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::io::Read;
+use std::io::{Read, Write};
 
 /// Inputs of at least this many bytes are hashed by several threads.
 const PARALLEL: usize = 1 << 20;
@@ -39,6 +39,18 @@ impl Digest {
         }
     }
 
+    /// The hash of all that `write` writes, and the number of bytes.
+    ///
+    /// # Errors
+    /// Those of `write`.
+    pub fn of_written(
+        write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+    ) -> std::io::Result<(Self, u64)> {
+        let mut sink = Sink { hasher: blake3::Hasher::new(), bytes: 0 };
+        write(&mut sink)?;
+        Ok((Self(*sink.hasher.finalize().as_bytes()), sink.bytes))
+    }
+
     /// 64 hexadecimal digits.
     pub fn hex(&self) -> String {
         blake3::Hash::from_bytes(self.0).to_hex().to_string()
@@ -48,6 +60,24 @@ impl Digest {
     pub fn parse(hex: &str) -> Option<Self> {
         let hash = blake3::Hash::from_hex(hex).ok()?;
         (hash.to_hex().as_str() == hex).then(|| Self(*hash.as_bytes()))
+    }
+}
+
+/// Hashes what is written to it.
+struct Sink {
+    hasher: blake3::Hasher,
+    bytes: u64,
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        update(&mut self.hasher, bytes);
+        self.bytes += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
     }
 }
 
@@ -95,6 +125,11 @@ mod tests {
             let expected = Digest::from(blake3::hash(&bytes));
             assert_eq!(Digest::of(&bytes), expected);
             assert_eq!(Digest::of_reader(&bytes[..]).unwrap(), (expected, size as u64));
+            let in_two = Digest::of_written(|out| {
+                let (front, back) = bytes.split_at(size / 3);
+                out.write_all(front).and_then(|()| out.write_all(back))
+            });
+            assert_eq!(in_two.unwrap(), (expected, size as u64));
         }
     }
 

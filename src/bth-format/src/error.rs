@@ -30,9 +30,14 @@ struct Details {
     offset: Option<u64>,
     expected: Cow<'static, str>,
     found: Cow<'static, str>,
+    /// True if there was not enough memory.
+    memory: bool,
     path: Option<PathBuf>,
     source: Option<std::io::Error>,
 }
+
+/// The hint where there is not enough memory.
+const MEMORY_HINT: &str = "free memory or raise its limit (ulimit -v), or map the file";
 
 impl Error {
     /// An error outside of sections, at a byte of the file.
@@ -80,7 +85,14 @@ impl Error {
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
         let mut error =
             Self::new(Code::Read, None, None, ("a readable file".into(), format!("{source}").into()));
+        error.0.memory = source.kind() == std::io::ErrorKind::OutOfMemory;
         (error.0.path, error.0.source) = (Some(path.to_owned()), Some(source));
+        error
+    }
+    /// The error where there is no memory of this size.
+    pub(crate) fn memory(bytes: u64) -> Self {
+        let mut error = Self::at(Code::Read, 0, format!("{bytes} bytes of memory"), "less");
+        error.0.memory = true;
         error
     }
     #[cold]
@@ -91,7 +103,16 @@ impl Error {
         offset: Option<u64>,
         (expected, found): (Cow<'static, str>, Cow<'static, str>),
     ) -> Self {
-        Error(Box::new(Details { code, section, offset, expected, found, path: None, source: None }))
+        Error(Box::new(Details {
+            code,
+            section,
+            offset,
+            expected,
+            found,
+            memory: false,
+            path: None,
+            source: None,
+        }))
     }
     /// The same error with the object that its section belongs to.
     pub(crate) fn in_object(mut self, object: u32) -> Self {
@@ -138,7 +159,11 @@ impl Error {
     }
     /// What the user can do about it.
     pub fn hint(&self) -> &'static str {
-        self.0.code.hint()
+        if self.0.memory { MEMORY_HINT } else { self.0.code.hint() }
+    }
+    /// Returns true if there was not enough memory.
+    pub fn is_of_memory(&self) -> bool {
+        self.0.memory
     }
     /// The file, where it is known.
     pub fn path(&self) -> Option<&Path> {

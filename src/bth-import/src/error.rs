@@ -142,7 +142,9 @@ fn limit_hint(code: &str) -> &'static str {
         "BTH-L020" => "compile with --structure bvh, without tetrahedra",
         "BTH-L032" => "divide the scene into several with fewer objects",
         "BTH-L033" => "leave out one of these options",
-        "BTH-L034" => "free memory, or compile on a machine that has more",
+        "BTH-L034" => {
+            "free memory or raise its limit (ulimit -v), compile with --quality fast, or divide the model into several objects of a scene"
+        }
         "BTH-L050" => "shorten the names, or divide the scene into several",
         "BTH-L090" => {
             "ask for fewer threads (bthc: --threads), or let the user have more processes (ulimit -u) and memory"

@@ -14,10 +14,14 @@ use crate::materials::{ImageFile, Looks};
 use crate::mesh::{Attributes, Mesh, Positions, Report, Sequence, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
+use crate::room::{BYTES_PER_TRIANGLE, check_memory};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
 use crate::weld::{equal_in_all_frames, equal_positions, number};
 use crate::{attributes, coordinate_range, gltf, rounding, topology};
 use rayon::prelude::*;
+
+/// Bytes of a triangle that a format's reader has taken at most.
+const READ_PER_TRIANGLE: u64 = 60;
 
 /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The extension decides about the format, or else
 /// the content. Triangle ids are the source's face order after polygons have been triangulated. A
@@ -179,6 +183,7 @@ pub(crate) fn finish(
 ) -> Result<(Mesh, Report)> {
     let count = frames.as_ref().map_or(1, |frames| frames.positions.len() as u64);
     check_triangles(raw.triangles.len() as u64)?;
+    check_memory(raw.triangles.len() as u64, BYTES_PER_TRIANGLE - READ_PER_TRIANGLE)?;
     check_rows((raw.positions.len() as u64).saturating_mul(count))?;
     let moves = frames.is_some() || raw.deformation.is_some();
     let rounded = match &frames {

@@ -19,7 +19,7 @@ pub fn bundle(triangles: u32) -> Vec<u8> {
     let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &rows };
     let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
     let compiled = compile_cached(mesh, &options, &Cache::none(), &|_| true, &Silent).expect("it compiles");
-    compiled.content.expect("bytes").bytes().into_owned()
+    compiled.content.expect("bytes").bytes().expect("bytes in memory").into_owned()
 }
 
 /// A strip of tetrahedra whose vertices, but for the last, lie on the x axis: a line along it may

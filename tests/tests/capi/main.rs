@@ -274,7 +274,7 @@ fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
     let instances = [instance(0.0), instance(-50.0)];
     let outcome = memory::compile_scene(&[hills], &instances, &options, &Cache::none(), &Silent);
     let content = outcome.expect("it compiles").content.expect("the content");
-    assert!(std::fs::read(scene).expect("a file") == content.bytes().as_ref());
+    assert!(std::fs::read(scene).expect("a file") == content.bytes().expect("bytes in memory").as_ref());
 }
 
 #[test]

@@ -12,6 +12,8 @@ mod interrupt;
 mod known_rays;
 mod made_models;
 mod materials;
+#[cfg(target_os = "linux")]
+mod memory;
 mod mistakes;
 mod pictures;
 mod pipelines;

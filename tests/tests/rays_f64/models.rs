@@ -38,7 +38,7 @@ fn scene(positions: &[[f64; 3]], triangles: &[[u32; 3]], places: &[[[f64; 4]; 3]
             let instances: Vec<_> =
                 places.iter().map(|to_world| Instance { mesh: 0, to_world: *to_world }).collect();
             let compiled = compile_scene(&[mesh], &instances, &options, &Cache::none(), &Silent).unwrap();
-            bth::from_bytes(&compiled.content.unwrap().bytes())
+            bth::from_bytes(&compiled.content.unwrap().bytes().unwrap())
         }
     };
     let scene = scene.unwrap();

@@ -294,7 +294,7 @@ fn the_cache_keeps_groups() {
     let through = |options: &CompileOptions| {
         let found =
             bth_compile::pipeline::compile_cached(&path, options, &cache, &|_| true, &Silent).unwrap();
-        found.content.unwrap().bytes().into_owned()
+        found.content.unwrap().bytes().unwrap().into_owned()
     };
     let without = CompileOptions { names: false, ..options() };
     let first = through(&without);

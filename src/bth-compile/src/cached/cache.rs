@@ -6,10 +6,11 @@ use crate::error::Result;
 use crate::monitor::{Monitor, Recording};
 use crate::stage::CachedStage;
 use crate::tets;
-use bth_cache::{Key, Record, Store, WorkLock};
+use bth_cache::{Key, Pin, Record, Store, WorkLock};
 use bth_files::Digest;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::io::Write;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// The cache of a compilation, or none.
@@ -85,6 +86,14 @@ impl<'a> Cache<'a> {
         file
     }
 
+    /// The file of a record's content, which is not evicted while it is open.
+    pub(crate) fn pin(&self, record: &Record, monitor: &dyn Monitor) -> Option<Pin> {
+        let store = self.store?;
+        let pin = store.pin(record);
+        pass_notes(store, monitor);
+        pin
+    }
+
     /// Returns true if the store has the content of a record.
     pub(crate) fn holds(&self, record: &Record) -> bool {
         self.store.is_some_and(|store| store.holds(record))
@@ -114,9 +123,21 @@ impl<'a> Cache<'a> {
         report: &impl Serialize,
         recording: &Recording<'_>,
     ) -> Option<Record> {
+        self.put_written(key, part, &|out| out.write_all(bytes), report, recording)
+    }
+
+    /// As [`Self::put`], with what `write` writes.
+    pub(crate) fn put_written(
+        &self,
+        key: &Key,
+        part: &str,
+        write: &dyn Fn(&mut dyn Write) -> std::io::Result<()>,
+        report: &impl Serialize,
+        recording: &Recording<'_>,
+    ) -> Option<Record> {
         let store = self.store?;
         let report = with_warnings(report, recording).map_err(std::io::Error::from);
-        self.note_put(key, part, report.and_then(|report| store.put(key, bytes, report)), recording)
+        self.note_put(key, part, report.and_then(|report| store.put_written(key, write, report)), recording)
     }
 
     /// Keeps only the name of a content; see [`Store::put_name`].

@@ -120,7 +120,7 @@ pub fn compile<'a>(
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
     let (content, report) = compile_cached(source, options, &Cache::none(), &|_| true, monitor)?.into_built();
-    Ok((Compiled { bytes: content.bytes().into_owned() }, report))
+    Ok((Compiled { bytes: content.bytes()?.into_owned() }, report))
 }
 
 /// Compiles a model, or takes results from the cache that were made from the same content. `needed`
@@ -245,7 +245,7 @@ pub(crate) fn compile_or_fetch<R: Serialize>(
         message: format!("the report cannot be written: {e}"),
     })?;
     let record = match (key, keep) {
-        (Some(key), true) => cache.put(key, "", &content.bytes(), &report, &recording),
+        (Some(key), true) => cache.put_written(key, "", &|out| content.write_to(out), &report, &recording),
         (Some(key), false) => cache.put_name(key, (content.name(), content.length()), &report, monitor),
         (None, _) => None,
     };

@@ -15,6 +15,7 @@ use super::report::{CompileReport, StageReports, TetReports};
 use super::tetrahedralize::{Probe, Tetrahedralize};
 use super::traced::TracedMesh;
 use super::tree::{BuildTree, CountVisits, TreeOptions};
+use crate::bvh::Quality;
 use crate::cached::Cache;
 use crate::error::Result;
 use crate::free::{self, Free, FreeReport};
@@ -91,6 +92,9 @@ impl<'a> Compiler<'a> {
     /// Compiles a mesh into an object. `hash` is the hash of its geometry, if it is known.
     pub(crate) fn object(mut self, mesh: Mesh, hash: OnceCell<Digest>) -> Result<(Object, StageReports)> {
         self.options.check()?;
+        // Of the memory for a triangle its mesh has some already.
+        let more = if self.options.bvh.quality == Quality::Fast { 0 } else { 40 };
+        mesh::check_memory(mesh.triangles.len() as u64, mesh::BYTES_PER_TRIANGLE - 20 + more)?;
         if let Some(sequence) = mesh.sequence.clone() {
             warn_of_options(&self.source.display().to_string(), self.options, self.monitor);
             let options = &self.options.of_deforming();

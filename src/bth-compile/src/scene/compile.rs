@@ -34,7 +34,7 @@ pub fn compile(
     let (source, cache) = (SceneSource { folder, name }, Cache::none());
     let policy = CachePolicy { whole: true, needed: &|_| true };
     let (content, report) = compile_cached(manifest, source, options, &cache, policy, monitor)?.into_built();
-    Ok((Compiled { bytes: content.bytes().into_owned() }, report))
+    Ok((Compiled { bytes: content.bytes()?.into_owned() }, report))
 }
 
 /// The folder and the name of a scene.
@@ -69,12 +69,20 @@ pub fn compile_cached(
     policy: CachePolicy<'_>,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<SceneReport>> {
-    let context = Context::new(options, cache, monitor)?;
+    compile_in(manifest, source, &Context::new(options, cache, monitor)?, policy)
+}
+
+pub(super) fn compile_in(
+    manifest: &Manifest,
+    source: SceneSource<'_>,
+    context: &Context<'_>,
+    policy: CachePolicy<'_>,
+) -> Result<CachedCompilation<SceneReport>> {
     let mut clock = Clock::default();
-    let manifest = &*whole_files::expanded(manifest, source.folder, monitor)?;
-    let plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
-    warn_of_flattened(manifest, monitor);
-    through_cache(manifest, &plan, source.name, &context, clock, policy)
+    let manifest = &*whole_files::expanded(manifest, source.folder, context.monitor)?;
+    let plan = ScenePlan::of(manifest, source.folder, context.options, &mut clock)?;
+    warn_of_flattened(manifest, context.monitor);
+    through_cache(manifest, &plan, source.name, context, clock, policy)
 }
 
 /// Takes the file of a plan from the cache, or builds and keeps it.
@@ -205,12 +213,12 @@ fn build(
         let message = "known rays are rays through one model, and this is a scene".to_owned();
         return Err(Error::Limit { code: "BTH-L033", message });
     }
-    let objects = objects::build(manifest, &plan.sources, context, &mut clock)?;
+    let mut objects = objects::build(manifest, &plan.sources, context, &mut clock)?;
     deformers::check(manifest, &objects.number, name, &|object| objects.deformation(object))?;
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &objects.number)?;
 
     let provenance = pipeline::provenance_of_scene(&objects.sources, objects.worker.as_ref(), options)?;
-    let content = clock.time("file", || {
+    let (content, mut report) = clock.time("file", || {
         let mut builder = FileBuilder::new();
         objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
@@ -221,12 +229,13 @@ fn build(
         super::images::write(&mut builder, &plan.sources, &objects, context)?;
         builder.provenance(provenance)?;
         builder.check_limits()?;
-        let content = builder.content();
-        check(&objects, &parts, &content, name)?;
-        Ok::<_, Error>(content)
+        builder.move_large(&mut |bytes| context.keeper.keep_bytes(bytes))?;
+        let content = Content::from(builder.into_static());
+        let report = report(manifest, plan, &mut objects, &parts, content.length());
+        check(&objects, parts, &content, name)?;
+        Ok::<_, Error>((content, report))
     })?;
-
-    let report = report(manifest, plan, (objects, clock), &parts, content.length());
+    report.seconds = clock.into_times();
     Ok((content, report))
 }
 
@@ -234,7 +243,7 @@ fn build(
 fn report(
     manifest: &Manifest,
     plan: &ScenePlan<'_>,
-    (objects, clock): (Objects, Clock),
+    objects: &mut Objects,
     parts: &SceneParts,
     bytes: u64,
 ) -> SceneReport {
@@ -255,7 +264,7 @@ fn report(
     }
     let unused = manifest.objects.iter().zip(&plan.used).filter(|(_, used)| !**used);
     SceneReport {
-        seconds: clock.into_times(),
+        seconds: Vec::new(),
         unused: unused.map(|(object, _)| object.name.clone()).collect(),
         nodes: parts.nodes.len() as u64,
         instances: written_out[world].0,
@@ -272,25 +281,30 @@ fn report(
         bytes,
         resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),
         worker: objects.worker.clone(),
-        objects: objects.reports,
+        objects: std::mem::take(&mut objects.reports),
     }
 }
 
 /// Checks the first frame as a reader does. The sections of the objects have been checked one by
 /// one before, so the check reads a file with their OBJECT rows only; the whole file where objects
 /// deform.
-fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
+fn check(objects: &Objects, parts: SceneParts, content: &Content, name: &Path) -> Result<()> {
     if !parts.deformers.deformers.is_empty() {
-        return bth::from_bytes(&content.bytes()).map(drop).map_err(|e| refused(name, &e));
+        return bth::from_bytes(&content.bytes()?).map(drop).map_err(|e| refused(name, &e));
     }
     let mut rows_only = FileBuilder::new();
     objects.write_rows(&mut rows_only)?;
-    write::scene(&mut rows_only, parts)?;
-    let first_frame = |bytes: &[u8]| bth::check_first_frame(&bth_format::File::from_bytes(bytes)?);
+    write::scene(&mut rows_only, &parts)?;
+    let file = write::assembled(&rows_only)?;
+    // A scene may have millions of rows, so they are not in memory twice.
+    drop(rows_only);
+    drop(parts);
+    let Err(error) = bth::check_first_frame(&file) else { return Ok(()) };
     // Reports the error of the whole file instead, so that offsets in messages are offsets in the
     // whole file.
-    let whole = |error| first_frame(&content.bytes()).err().unwrap_or(error);
-    first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))
+    let whole = bth_format::File::from_bytes(&content.bytes()?);
+    let whole = whole.and_then(|whole| bth::check_first_frame(&whole));
+    Err(refused(name, &whole.err().unwrap_or(error)))
 }
 
 /// The error for a file that fails the reader's check: an input error when the first frame cannot

@@ -1,5 +1,6 @@
 //! What all parts of a scene's compilation share.
 
+use super::keeper::Keeper;
 use crate::cached::Cache;
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -15,6 +16,8 @@ pub(super) struct Context<'a> {
     pub(super) tetgen: Option<String>,
     /// The keys of objects, if they may be kept.
     pub(super) keys: Option<Arc<ObjectKeys>>,
+    /// Keeps the objects until the file is written.
+    pub(super) keeper: Arc<Keeper>,
     pub(super) monitor: &'a dyn Monitor,
 }
 
@@ -30,12 +33,13 @@ impl<'a> Context<'a> {
     ) -> Result<Self> {
         let tetgen = tetgen_in_keys(options, cache, monitor)?;
         let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
-        Ok(Self { options, cache, tetgen, keys, monitor })
+        Ok(Self { options, cache, tetgen, keys, keeper: Arc::new(Keeper::on_disk(cache)), monitor })
     }
 
     /// The same context with another monitor.
     pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
-        let Self { options, cache, ref tetgen, ref keys, .. } = *self;
-        Context { options, cache, tetgen: tetgen.clone(), keys: keys.clone(), monitor }
+        let Self { options, cache, ref tetgen, ref keys, ref keeper, .. } = *self;
+        let (tetgen, keys, keeper) = (tetgen.clone(), keys.clone(), keeper.clone());
+        Context { options, cache, tetgen, keys, keeper, monitor }
     }
 }

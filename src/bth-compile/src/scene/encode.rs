@@ -6,6 +6,7 @@ use crate::write::{Names, SceneParts};
 use bth_format::layout as on_disk;
 use bth_format::layout::NONE;
 use bth_scene::{Lens, LightKind, Manifest, NodeGroups, Track, Transform};
+use std::collections::HashSet;
 
 /// The order of the nodes with parents before children and groups before what shows them: the
 /// manifest's order where it has this property, else by depth.
@@ -81,11 +82,18 @@ pub(super) fn encode(
         names: Vec::new(),
         deformers: deformers::encode(manifest, &row_of, objects),
     };
+    // Names of nodes are different, so only those that others have, too, are looked up again.
+    let cameras = manifest.cameras.iter().map(|camera| camera.name.as_str());
+    let others: HashSet<&str> =
+        cameras.chain(manifest.lights.iter().map(|light| light.name.as_str())).collect();
     let groups = groups(manifest);
     let is_group = |node: usize| groups.as_ref().is_some_and(|groups| groups.is_group(node));
     for (row, &index) in order.iter().enumerate() {
         let node = &manifest.nodes[index];
-        let (name, name_length) = names.add(&node.name);
+        let (name, name_length) = match others.contains(node.name.as_str()) {
+            true => names.add(&node.name),
+            false => names.append(&node.name),
+        };
         let (transform, matrix) = transform(&node.transform);
         let hidden = if node.visible { 0 } else { on_disk::NODE_HIDDEN };
         parts.nodes.push(on_disk::Node {

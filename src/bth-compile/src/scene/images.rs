@@ -5,8 +5,10 @@ use super::objects::Objects;
 use super::sources::File;
 use crate::error::Result;
 use crate::source::changed;
-use crate::write::{self, FileBuilder};
+use crate::write::{self, DiskFile, FileBuilder};
+use bth_format::layout::kind;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Adds the images that textures of the objects refer to, from the files of their sources.
 ///
@@ -47,7 +49,11 @@ fn images_of(file: &File<'_>, context: &Context<'_>) -> Result<Vec<([u8; 16], Ve
         let images = bth_import::import_images(&file.full, file.digest.looks, context.monitor)?;
         return Ok(images.into_iter().map(|image| (image.name, image.bytes)).collect());
     }
-    let Ok(compiled) = bth_format::File::read(&file.full) else { return Err(changed(&file.full)) };
+    let table = bth_format::file::read_table(&file.full).map_err(|_| changed(&file.full))?;
+    let disk = Arc::new(DiskFile::at(&file.full));
+    let mut builder = FileBuilder::new();
+    builder.copied(&disk, table.iter().filter(|e| matches!(e.kind, kind::IMAGES | kind::IMAGE_BYTES)))?;
+    let compiled = write::assembled(&builder)?;
     if compiled.check_images().is_err() {
         return Ok(Vec::new());
     }

@@ -2,6 +2,7 @@
 
 use super::compile::{CachePolicy, through_cache};
 use super::context::Context;
+use super::keeper::Keeper;
 use super::plan::ScenePlan;
 use super::report::SceneReport;
 use super::sources::{File, SourcePart};
@@ -15,6 +16,7 @@ use crate::stage::Clock;
 use bth_scene::{Manifest, Node, Object, Source, Transform};
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A mesh at a place in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +52,8 @@ pub(crate) fn compile_meshes(
 ) -> Result<CachedCompilation<SceneReport>> {
     check(meshes.len(), instances)?;
     let manifest = manifest(meshes.len(), instances, names);
-    let context = Context::new(options, cache, monitor)?;
+    let keeper = Arc::new(Keeper::in_memory());
+    let context = Context { keeper, ..Context::new(options, cache, monitor)? };
     let mut clock = Clock::default();
     let plan = plan(&manifest, meshes, &mut clock);
     let policy = CachePolicy { whole: false, needed: &|_| true };

@@ -45,7 +45,11 @@ pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<SourceM
     let found = file.parts.iter().zip(known).map(|((part, _), known)| {
         known.or_else(|| {
             let Imported { mesh, summary } = imported.next()?;
-            Some(SourceMesh { summary, part: *part, mesh: Some(mesh) })
+            let bytes = size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..]);
+            // A file of many meshes is not read again for each.
+            let stays = context.keeper.has_room_for_mesh(2 * bytes as u64)
+                || context.cache.store().is_none() && file.parts.len() > 1;
+            Some(SourceMesh { summary, part: *part, mesh: stays.then_some(mesh) })
         })
     });
     let meshes: Vec<SourceMesh> = found.flatten().collect();

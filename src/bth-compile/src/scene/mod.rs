@@ -4,7 +4,8 @@
 //! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects
 //! and `object` one; `sources` and `meshes` read the source files, `of_file` names them in
 //! warnings; `clips` gives the poses of objects that skins and morph targets deform; `sections`
-//! holds the sections of objects until they are written; `encode` lays out the scene itself.
+//! holds the sections of objects, and `keeper` keeps them until they are written; `encode` lays out
+//! the scene itself.
 
 mod clips;
 mod compile;
@@ -14,6 +15,7 @@ mod encode;
 mod files;
 mod images;
 mod in_memory;
+mod keeper;
 mod meshes;
 mod moving;
 mod object;

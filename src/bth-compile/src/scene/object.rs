@@ -4,6 +4,7 @@
 use super::context::Context;
 use super::meshes::{SourceMesh, object_key};
 use super::report::ObjectReport;
+use super::sections::ObjectSections;
 use super::sources::File;
 use crate::cached::replay;
 use crate::error::Result;
@@ -24,7 +25,7 @@ const MEMORY_AT_LEAST: u64 = 4 << 20;
 
 /// An object with its sections. Every index in them has been checked.
 pub(super) struct BuiltObject {
-    pub(super) file: bth_format::File,
+    pub(super) sections: ObjectSections,
     pub(super) record: ObjectRecord,
 }
 
@@ -56,15 +57,30 @@ pub(super) fn build(
     let Context { cache, monitor, .. } = context;
     let fetched = || key.as_ref().and_then(|key| fetch(key, &part, context));
     let (found, _working) = cache.find_or_lock((key.as_ref(), &part), *monitor, fetched)?;
-    if let Some(found) = found {
-        return Ok(found);
+    if let Some((found, record)) = found {
+        return Ok(BuiltObject { sections: found.keep(context)?, record });
     }
     let recording = Recording::new(*monitor);
-    let built = compile(file, mesh, (&part, &options), (context, &recording), clock)?;
-    if let Some(key) = key {
-        cache.put(&key, &part, built.file.bytes(), &built.record, &recording);
+    let (built, record) = compile(file, mesh, (&part, &options), (context, &recording), clock)?;
+    let kept = key.and_then(|key| cache.put(&key, &part, built.bytes(), &record, &recording));
+    let pinned = kept.and_then(|kept| context.keeper.pin(&kept, cache, *monitor));
+    let found = pinned.map_or(Fetched::InMemory(built), Fetched::Pinned);
+    Ok(BuiltObject { sections: found.keep(context)?, record })
+}
+
+/// An object in memory or in the cache.
+enum Fetched {
+    InMemory(bth_format::File),
+    Pinned(ObjectSections),
+}
+
+impl Fetched {
+    fn keep(self, context: &Context<'_>) -> Result<ObjectSections> {
+        match self {
+            Self::InMemory(file) => context.keeper.keep(file),
+            Self::Pinned(sections) => Ok(sections),
+        }
     }
-    Ok(built)
 }
 
 /// Compiles a mesh into a file with one object.
@@ -74,7 +90,7 @@ fn compile(
     (part, options): (&str, &CompileOptions),
     (context, monitor): (&Context<'_>, &dyn Monitor),
     clock: &mut Clock,
-) -> Result<BuiltObject> {
+) -> Result<(bth_format::File, ObjectRecord)> {
     let triangles = clock.time("mesh", || mesh.take(file, context))?;
     if mesh.summary.deforms() {
         warn_of_options(part, context.options, monitor);
@@ -103,15 +119,19 @@ fn compile(
         object_sections(&mut builder, 0, &built.parts(options))?;
         write::open(&builder)
     })?;
-    Ok(BuiltObject { file, record })
+    Ok((file, record))
 }
 
 /// An object from the cache.
-fn fetch(key: &Key, part: &str, context: &Context<'_>) -> Option<BuiltObject> {
-    let record = context.cache.find(key, context.monitor)?;
-    let file = context.cache.open(&record, context.monitor).filter(|file| file.object_count() == 1)?;
+fn fetch(key: &Key, part: &str, context: &Context<'_>) -> Option<(Fetched, ObjectRecord)> {
+    let Context { cache, keeper, monitor, .. } = context;
+    let record = cache.find(key, *monitor)?;
+    let found = match keeper.pin(&record, cache, *monitor) {
+        Some(sections) => Fetched::Pinned(sections),
+        None => Fetched::InMemory(cache.open(&record, *monitor).filter(|file| file.object_count() == 1)?),
+    };
     let report = ObjectRecord::deserialize(&record.report).ok()?;
-    context.cache.hit(key, part);
-    replay(&record.report, context.monitor);
-    Some(BuiltObject { file, record: report })
+    cache.hit(key, part);
+    replay(&record.report, *monitor);
+    Some((found, report))
 }

@@ -13,10 +13,12 @@ use super::sources::{File, SourcePart};
 use crate::error::{self, Error, Result};
 use crate::stage::Clock;
 use crate::tets;
-use crate::write::FileBuilder;
+use crate::write::{self, DiskFile, FileBuilder};
+use bth_format::Code;
 use bth_format::layout::{self, kind};
 use bth_scene::Manifest;
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::Arc;
 use zerocopy::IntoBytes;
 
@@ -61,8 +63,7 @@ pub(super) fn build(
     }
     for (filled, built) in build_all(std::mem::take(&mut places.tasks), context, clock)? {
         objects.note_worker(built.record.worker);
-        let sections = ObjectSections::in_file(&Arc::new(built.file), 0, true);
-        places.fill(&filled, &(sections, built.record.object));
+        places.fill(&filled, &(built.sections, built.record.object));
     }
     (objects.stored, objects.reports) = places.stored.into_iter().flatten().unzip();
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
@@ -127,47 +128,63 @@ fn build_all(
     Ok(built)
 }
 
-/// Takes objects from a compiled file.
+/// Takes objects from a compiled file, in which they stay until they are copied.
 fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, file: &File<'_>) -> Result<()> {
     let path = file.full.as_path();
-    let unusable = |found: &str, hint: &str| Error::Input {
-        code: "BTH-I051",
-        place: error::Place::File(path.to_owned()),
-        message: format!("expected a compiled file that can be used: {found}"),
-        hint: hint.to_owned(),
-    };
-    let read = bth_format::File::read(path).map_err(|e| unusable(&e.without_hint().to_string(), e.hint()))?;
-    let read = Arc::new(read);
+    let table = bth_format::file::read_table(path).map_err(|e| unusable(path, "", &e))?;
+    let count = table.iter().filter(|e| e.kind == kind::OBJECT).count();
+    let disk = Arc::new(DiskFile::at(path));
     for (part, rows) in &file.parts {
         let SourcePart::Object(object) = *part else { continue };
-        let view = read.check(object).map_err(|e| {
+        let refused = |e: &bth_format::Error| {
             let names: Vec<_> = rows.iter().map(|row| manifest.objects[*row].name.as_str()).collect();
-            unusable(&format!("object \"{}\": {}", names.join("\", \""), e.without_hint()), e.hint())
-        })?;
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(b"compiled");
-        for section in read.sections().filter(|s| s.entry.object == object) {
-            hasher.update(&section.entry.kind.to_le_bytes()).update(&section.entry.stride.to_le_bytes());
-            // Computes the hash: the one in the section table is untrusted.
-            hasher.update(blake3::hash(section.bytes).as_bytes());
-        }
-        let content = hasher.finalize();
-        let stored = || {
-            let report = ObjectReport {
-                triangles: view.header.triangles.into(),
-                degenerate: view.header.dropped.into(),
-                tet_leaves: view.tet_leaves.len() as u64,
-                tet_triangles: view.tet_faces.len() as u64,
-                copied: true,
-                ..ObjectReport::default()
-            };
-            (ObjectSections::in_file(&read, object, false), report)
+            unusable(path, &format!("object \"{}\": ", names.join("\", \"")), e)
         };
+        if object as usize >= count {
+            let expected = format!("an object below {count}");
+            return Err(refused(&bth_format::Error::of_call(
+                Code::NoSuchObject,
+                expected,
+                object.to_string(),
+            )));
+        }
+        let sections = ObjectSections::on_disk(&disk, &table, object).map_err(|e| write::read_failed(&e))?;
+        let alone = sections.file()?;
+        let view = match alone.check(0) {
+            Ok(view) => view,
+            // The error with its place in the file itself.
+            Err(e) => {
+                let read = bth_format::File::read(path);
+                return Err(refused(
+                    &read.and_then(|whole| whole.check(object).map(drop)).err().unwrap_or(e),
+                ));
+            }
+        };
+        let report = ObjectReport {
+            triangles: view.header.triangles.into(),
+            degenerate: view.header.dropped.into(),
+            tet_leaves: view.tet_leaves.len() as u64,
+            tet_triangles: view.tet_faces.len() as u64,
+            copied: true,
+            ..ObjectReport::default()
+        };
+        let stored = (sections, report);
+        let content = stored.0.content();
         for row in rows {
-            objects.number[*row] = Some(places.of_compiled(content, look(manifest, *row), stored));
+            objects.number[*row] = Some(places.of_compiled(content, look(manifest, *row), &stored));
         }
     }
     Ok(())
+}
+
+/// The error for a compiled file that cannot be used; `what` names a part of it.
+pub(super) fn unusable(path: &Path, what: &str, error: &bth_format::Error) -> Error {
+    Error::Input {
+        code: "BTH-I051",
+        place: error::Place::File(path.to_owned()),
+        message: format!("expected a compiled file that can be used: {what}{}", error.without_hint()),
+        hint: error.hint().to_owned(),
+    }
 }
 
 impl Objects {

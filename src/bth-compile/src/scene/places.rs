@@ -66,11 +66,10 @@ impl<'a> Places<'a> {
         &mut self,
         content: blake3::Hash,
         look: Option<Paint>,
-        object: impl FnOnce() -> Stored,
+        (sections, report): &Stored,
     ) -> u32 {
         *self.shared.entry((content, look)).or_insert_with(|| {
-            let (sections, report) = object();
-            self.stored.push(Some((painted(&sections, look), report)));
+            self.stored.push(Some((painted(sections, look), report.clone())));
             self.stored.len() as u32 - 1
         })
     }

@@ -1,12 +1,15 @@
 //! Compiled files that a manifest names as a whole: their scenes become groups of nodes.
 
+use super::objects::unusable;
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
+use crate::write::{DiskFile, FileBuilder, assembled};
 use bth_format::SceneView;
-use bth_format::layout::{self as on_disk, NODE_GROUP, NODE_HIDDEN, NODE_MATRIX, NONE};
+use bth_format::layout::{self as on_disk, NODE_GROUP, NODE_HIDDEN, NODE_MATRIX, NONE, kind};
 use bth_scene::{Interpolation, Manifest, Node, Object, Property, Source, Track, Transform};
 use std::borrow::Cow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The manifest with the scenes of such files as groups. A file of one object without a scene is
 /// that object.
@@ -22,24 +25,13 @@ pub(super) fn expanded<'a>(
     for row in 0..manifest.objects.len() {
         let Source::Compiled { path, object: None } = &manifest.objects[row].source else { continue };
         let (path, full) = (path.clone(), folder.join(path));
-        let unusable = |found: &str, hint: &str| Error::Input {
-            code: "BTH-I051",
-            place: Place::File(full.clone()),
-            message: format!("expected a compiled file that can be used: {found}"),
-            hint: hint.to_owned(),
-        };
-        let defect = |e: bth_format::Error| unusable(&e.without_hint().to_string(), e.hint());
-        let file = bth_format::File::read(&full).map_err(defect)?;
-        let view = file.check_scene().map_err(defect)?;
+        let file = rows_of(&full)?;
+        let view = file.check_scene().map_err(|e| unusable(&full, "", &e))?;
         let count = file.object_count();
         if view.is_none() && count == 1 {
             continue;
         }
         let manifest = manifest.to_mut();
-        if view.as_ref().is_some_and(|view| !view.deformers.is_empty()) {
-            let hint = "name its source instead, or one of its objects by `object`";
-            return Err(unusable("skins and morph targets cannot be in a group", hint));
-        }
         let mut expansion = Expansion { manifest, row, path, first: row, group: 0 };
         expansion.add_objects(count);
         match &view {
@@ -56,6 +48,23 @@ pub(super) fn expanded<'a>(
         expansion.show();
     }
     Ok(manifest)
+}
+
+/// The scene of a file and the rows of its objects.
+fn rows_of(path: &Path) -> Result<bth_format::File> {
+    let table = bth_format::file::read_table(path).map_err(|e| unusable(path, "", &e))?;
+    if table.iter().any(|e| e.kind == kind::DEFORMERS && e.count > 0) {
+        return Err(Error::Input {
+            code: "BTH-I051",
+            place: Place::File(path.to_owned()),
+            message: "expected a file that can be a group, found skins or morph targets".to_owned(),
+            hint: "name its source instead, or one of its objects by `object`".to_owned(),
+        });
+    }
+    let mut builder = FileBuilder::new();
+    let rows = table.iter().filter(|e| e.kind == kind::OBJECT || kind::is_scene(e.kind));
+    builder.copied(&Arc::new(DiskFile::at(path)), rows)?;
+    assembled(&builder)
 }
 
 /// A file that becomes a group.

@@ -1,16 +1,20 @@
 //! Lays sections out behind header and table. The same sections give the same bytes in whatever
 //! order they are added.
 
-use super::content::{Bytes, Content};
+use super::{Bytes, DiskFile};
 use crate::error::{Error, Result};
 use bth_format::file::{content_id, hash128};
 use bth_format::layout::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use zerocopy::IntoBytes;
 
 /// Bytes that one task copies.
 const COPIED_AT_ONCE: usize = 4 << 20;
+
+/// Bytes of a section that is not copied in memory.
+const LARGE: usize = 1 << 20;
 
 /// Collects the sections of a file.
 #[derive(Clone, Debug, Default)]
@@ -79,6 +83,22 @@ impl<'a> FileBuilder<'a> {
         }
     }
 
+    /// Adds sections of a file on disk. OBJECT sections only where no feature is needed for them.
+    ///
+    /// # Errors
+    /// The errors of [`Self::section`].
+    pub(crate) fn copied<'e>(
+        &mut self,
+        file: &Arc<DiskFile>,
+        entries: impl IntoIterator<Item = &'e SectionEntry>,
+    ) -> Result<()> {
+        for &SectionEntry { kind, object, stride, hash, offset, length, .. } in entries {
+            let bytes = Bytes::OnDisk(file.clone(), offset..offset + length);
+            self.hashed_section(SectionHead { kind, object, stride, hash }, None, bytes)?;
+        }
+        Ok(())
+    }
+
     /// Adds a section of structures; skips one without elements.
     ///
     /// # Errors
@@ -123,57 +143,112 @@ impl<'a> FileBuilder<'a> {
 
     /// Bytes of the file.
     pub fn file_length(&self) -> u64 {
-        let end = self.entries().last().map_or(self.table_end(), |e| e.offset + e.length);
-        end.next_multiple_of(ALIGNMENT as u64)
+        self.end(&self.entries())
     }
 
     /// The whole file in memory.
     pub fn finish(&self) -> Vec<u8> {
-        let mut bytes = vec![0; self.file_length() as usize];
-        self.copies(&mut bytes).into_iter().for_each(|(to, from)| to.copy_from_slice(from));
+        let mut bytes = Vec::with_capacity(self.file_length() as usize);
+        let take = &mut |piece: &[u8]| {
+            bytes.extend_from_slice(piece);
+            Ok(())
+        };
+        self.write_to(take).expect("sections in memory can be read");
         bytes
     }
 
-    /// Writes header and table into as many zero bytes as the file has. Returns where which bytes
-    /// of the sections are to be copied.
-    pub(super) fn copies<'b>(&'b self, bytes: &'b mut [u8]) -> Vec<(&'b mut [u8], &'b [u8])> {
+    /// Passes on the bytes of the file, in pieces. Sections on disk are read.
+    ///
+    /// # Errors
+    /// Those of `take`, and of files that cannot be read again or have changed.
+    pub(crate) fn write_to(&self, take: &mut dyn FnMut(&[u8]) -> std::io::Result<()>) -> std::io::Result<()> {
         let entries = self.entries();
-        let head = self.head(&entries);
+        take(self.header(&entries).as_bytes())?;
+        take(entries.as_bytes())?;
+        let mut end = self.table_end();
+        for (entry, section) in entries.iter().zip(self.sections.values()) {
+            take(&[0; ALIGNMENT][..(entry.offset - end) as usize])?;
+            section.bytes.read(section.hash, take)?;
+            end = entry.offset + entry.length;
+        }
+        take(&[0; ALIGNMENT][..(end.next_multiple_of(ALIGNMENT as u64) - end) as usize])
+    }
+
+    /// Writes header, table and sections on disk into as many zero bytes as the file has. Returns
+    /// where which bytes of the sections in memory are to be copied.
+    ///
+    /// # Errors
+    /// Those of files that cannot be read again or have changed.
+    pub(super) fn copies<'b>(
+        &'b self,
+        bytes: &'b mut [u8],
+    ) -> std::io::Result<Vec<(&'b mut [u8], &'b [u8])>> {
+        let entries = self.entries();
+        let head = [self.header(&entries).as_bytes(), entries.as_bytes()].concat();
         let (front, mut rest) = bytes.split_at_mut(head.len());
         front.copy_from_slice(&head);
         let mut end = head.len();
         let mut copies = Vec::with_capacity(entries.len());
         for (entry, section) in entries.iter().zip(self.sections.values()) {
-            let from = &*section.bytes;
             let (_, section_and_rest) = rest.split_at_mut(entry.offset as usize - end);
-            let (to, behind) = section_and_rest.split_at_mut(from.len());
-            copies.extend(to.chunks_mut(COPIED_AT_ONCE).zip(from.chunks(COPIED_AT_ONCE)));
+            let (to, behind) = section_and_rest.split_at_mut(entry.length as usize);
+            match section.bytes.in_memory() {
+                Some(from) => copies.extend(to.chunks_mut(COPIED_AT_ONCE).zip(from.chunks(COPIED_AT_ONCE))),
+                None => {
+                    let mut at = 0;
+                    section.bytes.read(section.hash, &mut |piece| {
+                        to[at..at + piece.len()].copy_from_slice(piece);
+                        at += piece.len();
+                        Ok(())
+                    })?;
+                }
+            }
             rest = behind;
-            end = entry.offset as usize + from.len();
+            end = (entry.offset + entry.length) as usize;
         }
-        copies
+        Ok(copies)
     }
 
-    /// The file, ready to be written.
-    pub(crate) fn content(self) -> Content {
-        let entries = self.entries();
-        let mut content = Content::new(self.head(&entries));
-        let length = self.file_length();
-        for (entry, section) in entries.iter().zip(self.sections.into_values()) {
-            content.pad_to(entry.offset);
-            content.push(section.bytes);
-        }
-        content.pad_to(length);
-        content
+    /// The name of the file's content: the hash of its header.
+    pub(super) fn name(&self) -> bth_files::Digest {
+        bth_files::Digest::of(self.header(&self.entries()).as_bytes())
     }
 
-    /// Header and section table.
-    fn head(&self, entries: &[SectionEntry]) -> Vec<u8> {
+    /// Moves the bytes of large sections elsewhere, where `to` takes them.
+    ///
+    /// # Errors
+    /// Those of `to`.
+    pub(crate) fn move_large(
+        &mut self,
+        to: &mut dyn FnMut(&[u8]) -> Result<Option<Bytes<'static>>>,
+    ) -> Result<()> {
+        for section in self.sections.values_mut() {
+            if let Bytes::Owned(bytes) = &section.bytes
+                && bytes.len() >= LARGE
+                && let Some(moved) = to(bytes)?
+            {
+                section.bytes = moved;
+            }
+        }
+        Ok(())
+    }
+
+    /// The same without borrows.
+    pub(crate) fn into_static(self) -> FileBuilder<'static> {
+        let Self { sections, required_features } = self;
+        let owned = |(key, section): (_, Section<'_>)| {
+            let Section { flags, stride, hash, bytes } = section;
+            (key, Section { flags, stride, hash, bytes: bytes.into_static() })
+        };
+        FileBuilder { sections: sections.into_iter().map(owned).collect(), required_features }
+    }
+
+    fn header(&self, entries: &[SectionEntry]) -> Header {
         let mut header = Header {
             identifier: IDENTIFIER,
             writer_version: WRITER_VERSION,
             minimum_reader_version: MINIMUM_READER_VERSION,
-            file_length: self.file_length(),
+            file_length: self.end(entries),
             section_offset: size_of::<Header>() as u64,
             section_count: entries.len() as u32,
             reserved: 0,
@@ -184,7 +259,13 @@ impl<'a> FileBuilder<'a> {
             header_hash: [0; 16],
         };
         header.header_hash = hash128(&header.as_bytes()[..std::mem::offset_of!(Header, header_hash)]);
-        [header.as_bytes(), entries.as_bytes()].concat()
+        header
+    }
+
+    /// Bytes of a file with these entries.
+    fn end(&self, entries: &[SectionEntry]) -> u64 {
+        let end = entries.last().map_or(self.table_end(), |e| e.offset + e.length);
+        end.next_multiple_of(ALIGNMENT as u64)
     }
 
     fn table_end(&self) -> u64 {
@@ -195,7 +276,7 @@ impl<'a> FileBuilder<'a> {
         let mut end = self.table_end();
         let entry = |(&(object, kind), section): (&(u32, u32), &Section)| {
             let offset = end.next_multiple_of(ALIGNMENT as u64);
-            let length = section.bytes.len() as u64;
+            let length = section.bytes.len();
             end = offset + length;
             SectionEntry {
                 kind,

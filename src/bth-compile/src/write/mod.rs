@@ -2,7 +2,9 @@
 
 mod atomic;
 mod builder;
+mod bytes;
 mod content;
+mod disk;
 mod groups;
 mod images;
 mod names;
@@ -11,17 +13,19 @@ mod open;
 mod scene;
 mod whole;
 
+pub(crate) use atomic::unread;
 pub use atomic::{write_atomically, write_content};
 pub use builder::FileBuilder;
 pub(crate) use builder::SectionHead;
-pub(crate) use content::Bytes;
+pub(crate) use bytes::Bytes;
 pub use content::Content;
+pub(crate) use disk::{DiskFile, Unread};
 pub use groups::{GroupParts, object_names};
 pub use images::images;
 pub(crate) use images::named_images;
 pub(crate) use names::Names;
 pub use object::{ObjectParts, Source, object};
-pub(crate) use open::open;
+pub(crate) use open::{assembled, open};
 pub use scene::{DeformerParts, SceneParts, scene};
 pub use whole::name_if_whole;
 
@@ -40,4 +44,9 @@ pub fn checked(file: bth_format::File) -> Result<bth_format::File> {
 
 pub(crate) fn defect(error: bth::Error) -> Error {
     Error::Internal { code: "BTH-X030", message: format!("the written file fails: {error}") }
+}
+
+/// The error of reading sections: of files on disk, or of memory, where none is expected.
+pub(crate) fn read_failed(error: &std::io::Error) -> Error {
+    unread(error).unwrap_or_else(|| Error::Internal { code: "BTH-X030", message: error.to_string() })
 }

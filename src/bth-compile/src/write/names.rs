@@ -16,9 +16,15 @@ impl Names {
         if let Some(first) = self.first.get(name) {
             return (*first, length);
         }
-        let first = self.bytes.len() as u32;
-        self.bytes.extend_from_slice(name.as_bytes());
+        let (first, length) = self.append(name);
         self.first.insert(name.to_owned(), first);
         (first, length)
+    }
+
+    /// Adds a name that is not asked for again.
+    pub(crate) fn append(&mut self, name: &str) -> (u32, u32) {
+        let first = self.bytes.len() as u32;
+        self.bytes.extend_from_slice(name.as_bytes());
+        (first, name.len() as u32)
     }
 }

@@ -1,8 +1,12 @@
 //! The name of a file's content, which its header determines, and the check of a whole file against
 //! it.
 
+use super::DiskFile;
 use bth_files::Digest;
 use bth_format::file::hash128;
+use bth_format::layout::ALIGNMENT;
+use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
 /// Bytes of the header; their hash is the name of the content.
@@ -17,21 +21,25 @@ pub(super) fn name(head: &[u8]) -> Digest {
 /// The name of a compiled file's content, if every byte of the file agrees with the hashes; else
 /// `None`.
 pub fn name_if_whole(path: &Path) -> Option<Digest> {
-    let file = bth_format::File::read(path).ok()?;
-    let bytes = file.bytes();
-    let mut end = HEADER + size_of_val(file.table());
-    for section in file.sections() {
-        let start = section.entry.offset as usize;
-        if !are_zeros(&bytes[end..start]) || hash128(section.bytes) != section.entry.hash {
-            return None;
-        }
-        end = start + section.bytes.len();
+    let table = bth_format::file::read_table(path).ok()?;
+    let mut file = std::fs::File::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    let mut head = [0; HEADER];
+    file.read_exact(&mut head).ok()?;
+    let file = DiskFile::open(path, file);
+    let read = |range, hash| file.read(range, hash, &mut |_| Ok(())).ok();
+    let zeros = |range: Range<u64>| {
+        let count = range.end.checked_sub(range.start)? as usize;
+        read(range, hash128([0; ALIGNMENT].get(..count)?))
+    };
+    let mut end = (HEADER + size_of_val(&table[..])) as u64;
+    for entry in &table {
+        zeros(end..entry.offset)?;
+        end = entry.offset + entry.length;
+        read(entry.offset..end, entry.hash)?;
     }
-    are_zeros(&bytes[end..]).then(|| name(bytes))
-}
-
-pub(super) fn are_zeros(bytes: &[u8]) -> bool {
-    bytes.iter().all(|b| *b == 0)
+    zeros(end..length)?;
+    Some(name(&head))
 }
 
 #[cfg(test)]
@@ -50,7 +58,7 @@ mod tests {
         let bytes = builder.finish();
         std::fs::write(&path, &bytes).unwrap();
         let named = name_if_whole(&path);
-        assert_eq!(named, Some(builder.content().name()));
+        assert_eq!(named, Some(crate::write::Content::from(builder.into_static()).name()));
         for at in 0..bytes.len() {
             let mut other = bytes.clone();
             other[at] ^= 1;

@@ -1,7 +1,7 @@
 //! Memory that holds the bytes of a file, aligned for every structure in it.
 
-use crate::error::{Code, Error, Result};
-use crate::layout::CacheLine;
+use crate::error::{Error, Result};
+use crate::layout::{CacheLine, Header};
 use memmap2::{Mmap, MmapMut};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -99,7 +99,7 @@ impl Buffer {
 
     /// Copies the bytes of a file.
     pub(super) fn copy(bytes: &[u8]) -> Result<Self> {
-        let mut owned = Owned::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;
+        let mut owned = Owned::zeroed(bytes.len()).ok_or_else(|| Error::memory(bytes.len() as u64))?;
         owned.bytes_mut().copy_from_slice(bytes);
         Ok(Buffer::Owned(owned))
     }
@@ -107,18 +107,24 @@ impl Buffer {
     /// Reads a whole file. The header is checked first, so that a file of another format is not
     /// read to its end.
     pub(super) fn read(path: &Path) -> Result<Self> {
+        Self::read_first(path, |header| header.file_length).map(|(buffer, _)| buffer)
+    }
+
+    /// Reads the first bytes of a file, whose header says how many. Returns the length of the file,
+    /// too.
+    pub(super) fn read_first(path: &Path, bytes: impl FnOnce(&Header) -> u64) -> Result<(Self, u64)> {
         let io = |e| Error::io(path, e);
         let (mut file, length) = open(path)?;
         let mut first = [0; super::table::HEADER_SIZE];
         let head = first.len().min(usize::try_from(length).unwrap_or(usize::MAX));
         file.read_exact(&mut first[..head]).map_err(io)?;
-        super::table::check_header(&first[..head], length)?;
+        let bytes = bytes(super::table::check_header(&first[..head], length)?);
         file.seek(SeekFrom::Start(0)).map_err(io)?;
 
-        let size = usize::try_from(length).map_err(|_| no_memory(length))?;
-        let mut owned = Owned::zeroed(size).ok_or_else(|| no_memory(length))?;
+        let size = usize::try_from(bytes).map_err(|_| Error::memory(bytes))?;
+        let mut owned = Owned::zeroed(size).ok_or_else(|| Error::memory(bytes))?;
         file.read_exact(owned.bytes_mut()).map_err(io)?;
-        Ok(Buffer::Owned(owned))
+        Ok((Buffer::Owned(owned), length))
     }
 
     /// Maps a whole file.
@@ -153,8 +159,4 @@ fn open(path: &Path) -> Result<(std::fs::File, u64)> {
     let file = std::fs::File::open(path).map_err(io)?;
     let length = file.metadata().map_err(io)?.len();
     Ok((file, length))
-}
-
-pub(super) fn no_memory(length: u64) -> Error {
-    Error::at(Code::Read, 0, format!("{length} bytes of memory"), "less")
 }

@@ -1,7 +1,7 @@
 //! An object of a file with separate positions.
 
+use super::File;
 use super::buffer::Owned;
-use super::{File, no_memory};
 use crate::Identity;
 use crate::error::{Code, Error, Result};
 use crate::layout::{CacheLine, Object, WIDTH};
@@ -54,7 +54,7 @@ impl DeformableObject {
             ));
         }
         let bytes = view.lines.as_bytes();
-        let mut lines = Owned::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;
+        let mut lines = Owned::zeroed(bytes.len()).ok_or_else(|| Error::memory(bytes.len() as u64))?;
         lines.bytes_mut().copy_from_slice(bytes);
         let positions = copy_of(view.positions)?;
         let header = Arc::new(*view.header);
@@ -139,7 +139,7 @@ impl DeformableObject {
 /// A copy of rows.
 fn copy_of<T: Copy>(rows: &[T]) -> Result<Vec<T>> {
     let mut copy = Vec::new();
-    copy.try_reserve_exact(rows.len()).map_err(|_| no_memory(size_of_val(rows) as u64))?;
+    copy.try_reserve_exact(rows.len()).map_err(|_| Error::memory(size_of_val(rows) as u64))?;
     copy.extend_from_slice(rows);
     Ok(copy)
 }

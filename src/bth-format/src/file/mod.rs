@@ -20,7 +20,7 @@ use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::{ExactPositions, MAX_LINES, ObjectBounds, ObjectView, Records};
 use crate::view;
-use buffer::{Buffer, no_memory};
+use buffer::Buffer;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use zerocopy::{FromBytes, Immutable, KnownLayout};
@@ -50,6 +50,20 @@ pub struct SectionView<'a> {
     pub bytes: &'a [u8],
 }
 
+/// Reads the section table of a file and nothing behind it, and checks it and the header.
+///
+/// # Errors
+/// As [`File::read`].
+pub fn read_table(path: &Path) -> Result<Vec<SectionEntry>> {
+    let read = || {
+        let (buffer, length) = Buffer::read_first(path, table::end)?;
+        table::check(buffer.bytes(), length)?;
+        let (header, _) = Header::ref_from_prefix(buffer.bytes()).ok().expect("checked above");
+        Ok(table::entries(buffer.bytes(), header).to_vec())
+    };
+    read().map_err(|e: Error| e.in_file(path))
+}
+
 /// Memory for the bytes of a file that a caller writes there, so that they need not be copied once
 /// more ([`File::from_memory`]).
 #[derive(Debug)]
@@ -61,7 +75,7 @@ impl FileMemory {
     /// # Errors
     /// `BTH-O001` when there is not enough memory.
     pub fn zeroed(length: usize) -> Result<Self> {
-        buffer::Owned::zeroed(length).map(Self).ok_or_else(|| buffer::no_memory(length as u64))
+        buffer::Owned::zeroed(length).map(Self).ok_or_else(|| Error::memory(length as u64))
     }
 
     /// The bytes.
@@ -119,7 +133,7 @@ impl File {
         if cfg!(target_endian = "big") {
             return Err(Error::at(Code::Host, 0, "a little-endian machine", "a big-endian one"));
         }
-        let objects = table::check(buffer.bytes())?;
+        let objects = table::check(buffer.bytes(), buffer.bytes().len() as u64)?;
         let views = (0..objects).map(|_| OnceLock::new()).collect();
         let mut rows = vec![[NONE; OBJECT_KINDS]; objects as usize];
         let (header, _) = Header::ref_from_prefix(buffer.bytes()).ok().expect("checked above");

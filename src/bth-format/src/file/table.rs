@@ -130,20 +130,26 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     Ok(header)
 }
 
+/// Where the section table of a file ends whose header has been checked.
+pub(super) fn end(header: &Header) -> u64 {
+    HEADER_SIZE as u64 + u64::from(header.section_count) * ENTRY_SIZE
+}
+
 /// The entries of the section table of a file whose header has been checked.
 pub(super) fn entries<'a>(bytes: &'a [u8], header: &Header) -> &'a [SectionEntry] {
-    let end = HEADER_SIZE + header.section_count as usize * ENTRY_SIZE as usize;
+    let end = end(header) as usize;
     <[SectionEntry]>::ref_from_bytes(&bytes[HEADER_SIZE..end])
         .ok()
         .expect("the buffer is aligned and a table is whole entries")
 }
 
-/// Checks the header and the section table of a whole file; returns the number of objects.
+/// Checks the header and the section table of a file of `length` bytes, with which `bytes` begin;
+/// returns the number of objects.
 ///
 /// # Errors
 /// The first violation of BTH-F001 to BTH-F019 and BTH-F022.
-pub(super) fn check(bytes: &[u8]) -> Result<u32> {
-    let header = check_header(bytes, bytes.len() as u64)?;
+pub(super) fn check(bytes: &[u8], length: u64) -> Result<u32> {
+    let header = check_header(bytes, length)?;
     let entries = entries(bytes, header);
     let hash = hash128(entries.as_bytes());
     if CHECKSUMS && header.table_hash != hash {

@@ -11,7 +11,7 @@ pub(crate) struct Jobs {
     #[arg(short, long, help_heading = JOBS, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) jobs: Option<u32>,
     /// Memory of all models and objects of scenes that are compiled at once, in MiB, estimated from
-    /// the sizes of their files. One is compiled in any case.
+    /// the sizes of their files; by default what the machine has left. One is compiled in any case.
     #[arg(long, help_heading = JOBS, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) memory: Option<u64>,
     /// Say what would be done and why, and do nothing.

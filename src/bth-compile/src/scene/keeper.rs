@@ -1,0 +1,166 @@
+//! Keeps the sections of objects until the scene's file is written: in memory while they are few,
+//! then on disk.
+
+use super::sections::ObjectSections;
+use crate::cached::Cache;
+use crate::error::{Error, Result};
+use crate::monitor::Monitor;
+use crate::write::{Bytes, DiskFile};
+use bth_cache::Record;
+use bth_format::file::read_table;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Bytes of objects that are kept in memory.
+const MEMORY: u64 = 64 << 20;
+/// Bytes of meshes that are kept in memory until they are compiled.
+const MESHES: u64 = 256 << 20;
+/// Objects of this size in the cache are copied from there, not read into memory.
+const LARGE: u64 = 4 << 20;
+/// Objects in the cache whose files may be open at a time.
+const MAX_PINNED: usize = 128;
+
+/// Keeps sections, from several threads.
+pub(super) struct Keeper {
+    /// Where a file without a name may be; `None` to keep everything in memory.
+    folder: Option<PathBuf>,
+    /// Bytes that are kept in memory.
+    memory: u64,
+    state: Mutex<Held>,
+}
+
+/// What has been kept.
+#[derive(Default)]
+struct Held {
+    bytes: u64,
+    meshes: u64,
+    pinned: usize,
+    spool: Option<Arc<DiskFile>>,
+}
+
+impl Keeper {
+    /// Keeps what exceeds the memory on disk: in the folder of the cache, else in the one for
+    /// temporary files.
+    pub(super) fn on_disk(cache: &Cache<'_>) -> Self {
+        let folder = || cache.store().map_or_else(std::env::temp_dir, |store| store.folder().to_owned());
+        // In a browser there are no files.
+        let folder = (!cfg!(target_family = "wasm")).then(folder);
+        Self { folder, memory: MEMORY, state: Mutex::default() }
+    }
+
+    /// Keeps everything in memory.
+    pub(super) fn in_memory() -> Self {
+        Self { folder: None, memory: MEMORY, state: Mutex::default() }
+    }
+
+    /// Returns true if a mesh of this size may stay in memory. Else it is read again when it is
+    /// compiled.
+    pub(super) fn has_room_for_mesh(&self, bytes: u64) -> bool {
+        let mut state = self.state();
+        state.meshes += bytes;
+        self.folder.is_none() || state.meshes <= MESHES
+    }
+
+    fn state(&self) -> MutexGuard<'_, Held> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The sections of the object in a file.
+    ///
+    /// # Errors
+    /// `BTH-O020` when they cannot be written to disk.
+    pub(super) fn keep(&self, file: bth_format::File) -> Result<ObjectSections> {
+        let mut sections = ObjectSections::in_file(file);
+        if let Some(spool) = self.spool_for(sections.bytes_in_all()) {
+            sections.move_to(&mut |bytes| self.append(&spool, bytes))?;
+        }
+        Ok(sections)
+    }
+
+    /// Bytes of a section that need not be in memory any more; `None` where they may stay.
+    ///
+    /// # Errors
+    /// The errors of [`Self::keep`].
+    pub(super) fn keep_bytes(&self, bytes: &[u8]) -> Result<Option<Bytes<'static>>> {
+        self.spool_for(bytes.len() as u64).map(|spool| self.append(&spool, bytes)).transpose()
+    }
+
+    fn append(&self, spool: &Arc<DiskFile>, bytes: &[u8]) -> Result<Bytes<'static>> {
+        let range = spool.append(bytes).map_err(|e| Error::File {
+            code: "BTH-O020",
+            path: self.folder.clone().unwrap_or_default(),
+            message: format!("cannot write a temporary file: {e}"),
+        })?;
+        Ok(Bytes::OnDisk(spool.clone(), range))
+    }
+
+    /// The file that takes these bytes; `None` while memory has room for them.
+    fn spool_for(&self, bytes: u64) -> Option<Arc<DiskFile>> {
+        let mut state = self.state();
+        let folder = self.folder.as_ref().filter(|_| state.bytes + bytes > self.memory);
+        let Some(folder) = folder else {
+            state.bytes += bytes;
+            return None;
+        };
+        if state.spool.is_none() {
+            // Where no file can be made, memory has to do.
+            let file = bth_files::nameless(folder).ok()?;
+            state.spool = Some(Arc::new(DiskFile::open(folder, file)));
+        }
+        state.spool.clone()
+    }
+
+    /// The sections of a large object that the cache has, which stay there; `None` where it is not
+    /// large, or cannot be kept there.
+    pub(super) fn pin(
+        &self,
+        record: &Record,
+        cache: &Cache<'_>,
+        monitor: &dyn Monitor,
+    ) -> Option<ObjectSections> {
+        {
+            let mut state = self.state();
+            if self.folder.is_none() || record.bytes < LARGE || state.pinned >= MAX_PINNED {
+                return None;
+            }
+            state.pinned += 1;
+        }
+        let pin = cache.pin(record, monitor)?;
+        let table = read_table(&pin.path).ok()?;
+        ObjectSections::on_disk(&Arc::new(DiskFile::open(&pin.path, pin.file)), &table, 0).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::CompileOptions;
+    use crate::scene::compile::{CachePolicy, SceneSource, compile_in};
+    use crate::scene::context::Context;
+    use bth_import::Silent;
+    use std::path::Path;
+
+    const MANIFEST: &str = "version = 1\n\
+        objects = [{ name = \"a\", model = \"a.obj\" }, { name = \"b\", model = \"a.obj\", color = [1, 0, 0] }]\n\
+        [[nodes]]\nname = \"1\"\nobject = \"a\"\n[[nodes]]\nname = \"2\"\nobject = \"b\"\n";
+
+    #[test]
+    fn what_is_kept_on_disk_comes_to_the_same_file() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let manifest = bth_scene::parse(MANIFEST, Path::new("m")).unwrap();
+        let (options, cache) = (CompileOptions::default(), Cache::none());
+        let source = SceneSource { folder: folder.path(), name: Path::new("m") };
+        let compiled = |keeper: Keeper| {
+            let context = Context::new(&options, &cache, &Silent).unwrap();
+            let context = Context { keeper: Arc::new(keeper), ..context };
+            let policy = CachePolicy { whole: false, needed: &|_| true };
+            let (content, _) = compile_in(&manifest, source, &context, policy).unwrap().into_built();
+            (content.bytes().unwrap().into_owned(), context.keeper.state().spool.is_some())
+        };
+        let (in_memory, spooled) = compiled(Keeper::in_memory());
+        assert!(!spooled);
+        let on_disk = Keeper { memory: 0, ..Keeper::on_disk(&cache) };
+        assert_eq!(compiled(on_disk), (in_memory, true));
+    }
+}

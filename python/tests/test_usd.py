@@ -107,8 +107,8 @@ def test_prototypes_may_be_shown_themselves_and_reset_their_transforms():
 def test_subdivision_follows_the_rules():
     stage = Usd.Stage.CreateInMemory()
     soft = cube(stage, "/soft", "catmullClark")
-    with pytest.warns(UserWarning, match="control cages"):
-        assert len(corners(compiled(stage))) == 8
+    with pytest.warns(UserWarning, match="control cages") as told:
+        assert len(corners(compiled(stage))) == 8 and len(told) == 1
     scene = compiled(stage, subdivision=1)
     assert scene.triangle_counts.tolist() == [48]
     expected = [5 / 9 * CUBE, *(0.75 * v for v in [CUBE * m for m in ([1, 1, 0], [1, 0, 1], [0, 1, 1])]), *(CUBE * m for m in np.eye(3))]
@@ -258,6 +258,8 @@ def test_messy_meshes_are_counted():
     cube(stage, "/far").CreateFaceVertexIndicesAttr([99] * 24)
     cube(stage, "/none").CreatePointsAttr([])
     cube(stage, "/hole").CreateHoleIndicesAttr([0, 1, 2, 3, 4])
-    with pytest.warns(UserWarning, match="3 × meshes without usable faces"):
+    UsdGeom.Xform.Define(stage, "/lost").GetPrim().GetReferences().AddReference("nowhere.usda")
+    with pytest.warns(UserWarning) as told:
         scene = compiled(stage)
+    assert [str(one.message) for one in told] == ["1 × references and layers that are missing or broken", "3 × meshes without usable faces"]
     assert sorted(scene.triangle_counts[scene.objects_of_instances].tolist()) == [2, 12]

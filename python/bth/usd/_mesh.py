@@ -86,7 +86,7 @@ def mesh(prim, time, levels, names, dropped):
     faces = np.arange(len(counts))
     if scheme == "catmullClark" and levels:
         polygons, faces = _subdivided(of, polygons, time, levels)
-    elif scheme not in ("none", "bilinear"):
+    elif scheme not in ("none", "bilinear", "catmullClark"):
         dropped[f"{scheme} subdivision: control cages are shown"] += 1
     return _without_holes(of, polygons, faces, time), scheme
 

@@ -49,6 +49,8 @@ class Converter:
         self._time = Usd.TimeCode(start) if stage.HasAuthoredTimeCodeRange() else Usd.TimeCode.EarliestTime()
 
     def run(self):
+        if missing := self._stage.GetCompositionErrors():
+            self.dropped["references and layers that are missing or broken"] += len(missing)
         root = None
         if UsdGeom.GetStageUpAxis(self._stage) == UsdGeom.Tokens.z:
             root = "upright"

@@ -12,6 +12,7 @@ pub(crate) struct Foreign {
 }
 
 const EXPORT: &str = "export the model as glTF, for example with Blender or assimp";
+const USD: &str = "python -m bth usd compiles it (pip install bth-rays[usd]); or export the model as glTF";
 const UNPACK: &str = "unpack it first";
 
 /// What files of other formats begin with.
@@ -19,13 +20,17 @@ const STARTS: [(&[u8], &str, &str); 13] = [
     (b"Kaydara FBX Binary", "an FBX file", EXPORT),
     (b"; FBX", "an FBX file", EXPORT),
     (b"BLENDER", "a Blender file", EXPORT),
-    (b"PXR-USDC", "a USD file", EXPORT),
-    (b"#usda", "a USD file", EXPORT),
+    (b"PXR-USDC", "a USD file", USD),
+    (b"#usda", "a USD file", USD),
     (b"ISO-10303-21", "a STEP or IFC file", EXPORT),
     (b"#VRML", "a VRML file", EXPORT),
     (b"# vtk DataFile", "a VTK file", "write it as PLY, for example with meshio"),
     (b"Ogawa", "an Alembic file", EXPORT),
-    (b"PK\x03\x04", "a ZIP archive, as 3MF and USDZ files are", "unpack it, or export the model as glTF"),
+    (
+        b"PK\x03\x04",
+        "a ZIP archive, as 3MF and USDZ files are",
+        "python -m bth usd compiles USDZ files; else unpack it, or export the model as glTF",
+    ),
     (b"\x1F\x8B", "a file compressed with gzip", UNPACK),
     (b"\x28\xB5\x2F\xFD", "a file compressed with Zstandard", UNPACK),
     (b"\xFD7zXZ", "a file compressed with xz", UNPACK),

@@ -45,50 +45,74 @@ impl Drop for ExactMode {
 
 /// The control register, if it says another mode than IEEE 754.
 ///
-/// Reading the register waits for all floating-point operations before, so a sum tells the mode:
-/// of a denormal number and 0, of numbers that differ by a denormal one, and of 1 and a quarter of
-/// the distance to its neighbours. The register is read only where a thread has a mode for the
-/// first time; its other bits, exception masks and flags, are taken to be as they were then.
+/// Reading the register waits for all floating-point operations before, so sums tell the mode. It
+/// is read only where a thread has a mode for the first time; its other bits, exception masks and
+/// flags, are taken to be as they were then.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn foreign_mode() -> Option<Control> {
-    #[repr(align(16))]
-    struct Row([u32; 4]);
-    const TINY: u32 = 1 << 22;
-    const NORMAL: u32 = 1 << 23;
-    static NUMBERS: Row = Row([TINY, NORMAL | TINY, ONE, ONE]);
-    // 0, the negated smallest normal number, 2^-25 and -2^-26.
-    static ADDED: Row = Row([0, 1 << 31 | NORMAL, 102 << 23, 1 << 31 | 101 << 23]);
-    static EXPECTED: Row = Row([TINY, TINY, ONE, ONE]);
-    const ONE: u32 = 127 << 23;
-    let equal: u32;
-    // SAFETY: the instructions read 16 aligned bytes each, and change only the two registers that
-    // are named.
-    unsafe {
-        std::arch::asm!(
-            "movaps {row}, [{numbers}]",
-            "addps {row}, [{added}]",
-            "pcmpeqd {row}, [{expected}]",
-            "movmskps {equal:e}, {row}",
-            row = out(xmm_reg) _,
-            numbers = in(reg) &raw const NUMBERS.0,
-            added = in(reg) &raw const ADDED.0,
-            expected = in(reg) &raw const EXPECTED.0,
-            equal = lateout(reg) equal,
-            options(nostack, readonly, preserves_flags),
-        );
-    }
-    if equal == 0b1111 {
+    // A denormal number and 0: their sum is 0 where denormal numbers are zeros, or are flushed.
+    // 1 and a quarter of the distance to its neighbours: 1 where numbers are rounded to nearest.
+    static MODES: Sums = Sums([[TINY, ONE, ONE, 0], [0, UP, DOWN, 0], [TINY, ONE, ONE, 0]]);
+    if MODES.equal() == ALL_EQUAL {
         return None;
     }
+    // Tells numbers that are flushed from numbers that are zeros: in the IEEE mode, a denormal
+    // difference of normal numbers would take a hundred cycles.
+    static WHICH: Sums =
+        Sums([[TINY, NORMAL | TINY, ONE, ONE], [0, 1 << 31 | NORMAL, UP, DOWN], [TINY, TINY, ONE, ONE]]);
     thread_local!(static KNOWN: Cell<(u32, Control)> = const { Cell::new((u32::MAX, 0)) });
-    let (mode, former) = KNOWN.get();
+    let (equal, (mode, former)) = (WHICH.equal(), KNOWN.get());
     if mode == equal {
         return Some(former);
     }
     let former = read();
     KNOWN.set((equal, former));
     Some(former)
+}
+
+/// Bits of numbers, of numbers that are added to them, and of the sums in the mode of IEEE 754.
+#[cfg(target_arch = "x86_64")]
+#[repr(align(16))]
+struct Sums([[u32; 4]; 3]);
+
+#[cfg(target_arch = "x86_64")]
+const TINY: u32 = 1 << 22;
+#[cfg(target_arch = "x86_64")]
+const NORMAL: u32 = 1 << 23;
+#[cfg(target_arch = "x86_64")]
+const ONE: u32 = 127 << 23;
+/// 2^-25.
+#[cfg(target_arch = "x86_64")]
+const UP: u32 = 102 << 23;
+/// -2^-26.
+#[cfg(target_arch = "x86_64")]
+const DOWN: u32 = 1 << 31 | 101 << 23;
+#[cfg(target_arch = "x86_64")]
+const ALL_EQUAL: u32 = 0b1111;
+
+#[cfg(target_arch = "x86_64")]
+impl Sums {
+    /// Bits of the lanes whose sum is as in the mode of IEEE 754.
+    #[inline(always)]
+    fn equal(&'static self) -> u32 {
+        let equal: u32;
+        // SAFETY: the instructions read 16 aligned bytes each, and change only the two registers
+        // that are named.
+        unsafe {
+            std::arch::asm!(
+                "movaps {row}, [{sums}]",
+                "addps {row}, [{sums} + 16]",
+                "pcmpeqd {row}, [{sums} + 32]",
+                "movmskps {equal:e}, {row}",
+                row = out(xmm_reg) _,
+                sums = in(reg) &raw const self.0,
+                equal = lateout(reg) equal,
+                options(nostack, readonly, preserves_flags),
+            );
+        }
+        equal
+    }
 }
 
 #[cfg(not(target_arch = "x86_64"))]

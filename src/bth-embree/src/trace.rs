@@ -14,6 +14,7 @@ use crate::scene::Scene;
 use crate::statistics::{Kind, Who, counted};
 use bth::rays::PrimitiveRef;
 use bth::{Accept, rays};
+use glam::Vec4;
 use std::cell::Cell;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -43,7 +44,11 @@ pub(crate) fn trace(committed: &Committed, query: Query<'_>) -> Found {
     let tnear = if tnear > 0.0 { tnear } else { 0.0 };
     let tmin = if committed.is_robust { tnear } else { tnear.next_up() };
     let mode = ExactMode::enter();
-    let ray = rays::Ray { origin, tmin, direction, tmax: tfar };
+    // Made in vector registers: the kernel loads whole vectors, and would wait for words that were
+    // just written one by one until all instructions before have ended.
+    let [[x, y, z], [dx, dy, dz]] = [origin, direction];
+    let rows = [Vec4::new(x, y, z, tmin).to_array(), Vec4::new(dx, dy, dz, tfar).to_array()];
+    let ray: rays::Ray = zerocopy::transmute!(rows);
     let filters = Filtering::of(committed, &query);
     if !filters.may_apply && committed.all_meet(mask) {
         if query.is_occluded {

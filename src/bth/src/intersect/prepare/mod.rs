@@ -21,6 +21,7 @@ use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::{GREATEST_IN_F32, ObjectBounds};
 use glam::{Vec3A, Vec4, Vec4Swizzles};
+use std::hint::black_box;
 use std::mem::offset_of;
 use std::ops::Range;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -135,7 +136,10 @@ impl PreparedRay {
         let [greatest_origin, ..] = s.greatest_of_three(start.abs().to_array());
         let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
         // NaN and infinity among the components make these the largest.
-        let (extent, is_prepared) = padded_extent(bounds, greatest_origin, reach);
+        // The reach is known later than the rest, and box tests wait for the pads: it is read only
+        // where the object is far away, by a branch.
+        let near = if bounds.away > 0.0 { black_box(reach) } else { f32::INFINITY };
+        let (extent, is_prepared) = padded_extent(bounds, greatest_origin, near);
         if !(lies_between(greatest, 1.0 / LARGEST, LARGEST) & is_prepared & (start.w <= tmax)) {
             return None;
         }

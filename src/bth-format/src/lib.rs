@@ -34,6 +34,7 @@ pub mod groups;
 mod identity;
 pub mod layout;
 pub mod limits;
+pub mod memory;
 mod names;
 pub mod object;
 mod unpack;

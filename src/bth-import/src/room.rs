@@ -16,7 +16,7 @@ pub fn check_memory(triangles: u64, each: u64) -> Result<()> {
     if triangles < FEW {
         return Ok(());
     }
-    let (needed, left) = (triangles.saturating_mul(each), bth_files::memory::available());
+    let (needed, left) = (triangles.saturating_mul(each), bth_format::memory::available());
     if needed <= left {
         return Ok(());
     }

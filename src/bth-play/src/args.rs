@@ -122,17 +122,19 @@ pub(crate) struct Args {
     /// Upper end of the heat map of mode steps; by default according to each picture.
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) scale: Option<u32>,
-    /// Threads; 0 for one per processor. The picture does not depend on it.
+    /// Threads; 0 for one per processor, or more where the file does not fit in memory. The picture
+    /// does not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = parse_threads)]
     pub(crate) threads: usize,
-    /// Map the file instead of reading and checking it. It must be as bthc wrote it, and nobody may
-    /// change it meanwhile.
+    /// Read the whole file and check it, instead of mapping it. A mapped file must be as bthc wrote
+    /// it, and nobody may change it meanwhile.
     #[arg(long)]
-    pub(crate) map: bool,
+    pub(crate) read: bool,
     /// Folder of the cache; by default BTH_CACHE_DIR, else `bth` in the user's folder for caches.
     #[arg(long, value_name = "FOLDER")]
     pub(crate) cache_dir: Option<PathBuf>,
-    /// Also print what each frame took, memory, and how many objects were touched.
+    /// Also print what each frame took, memory, what was read from storage, and how many objects
+    /// were touched.
     #[arg(long)]
     pub(crate) stats: bool,
     /// Print one JSON object.

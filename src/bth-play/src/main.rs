@@ -75,10 +75,10 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         inputs.extend(compiled.inputs.iter().cloned());
         (Some(compiled.pin.path.as_path()), open(&compiled.pin.path, true)?)
     } else {
-        (Some(file).filter(|_| args.map), open(file, args.map)?)
+        (Some(file).filter(|_| !args.read), open(file, !args.read)?)
     };
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads)
+        .num_threads(thread_count(args.threads, &scene))
         .build()
         .map_err(|e| Failure::Threads(format!("cannot start {} threads: {e}", args.threads)))?;
     let threads = pool.current_num_threads();
@@ -105,11 +105,22 @@ fn show_window(
     Err(Failure::Usage("this bth-play was built without its feature `window`; -o writes pictures".to_owned()))
 }
 
+/// Threads for each processor where the file does not fit in memory: most of them wait for pages.
+const WAITING: usize = 16;
+
+/// The number of threads that was asked for, or the default; 0 is one per processor.
+fn thread_count(asked: usize, scene: &bth::Scene) -> usize {
+    match asked {
+        0 if scene.file().is_paged() => WAITING * std::thread::available_parallelism().map_or(1, usize::from),
+        asked => asked,
+    }
+}
+
 #[allow(unsafe_code)]
 fn open(file: &Path, map: bool) -> Result<bth::Scene, bth::Error> {
     if map {
         // SAFETY: `map` requires that bthc wrote the file, and that nobody changes or shrinks it
-        // while it is mapped. With `--map` the user guarantees this, as its help tells. Entries of
+        // while it is mapped. Without `--read` the user guarantees this, as its help tells. Entries of
         // the cache are read-only and are created by linking a finished file; no program of the
         // workspace opens one for writing, and the hash of this one was compared with what bthc
         // wrote.

@@ -32,6 +32,12 @@ struct Stats {
     mapped_bytes: u64,
     /// Bytes of the file in memory of this process; null where the system does not tell.
     resident_bytes: Option<u64>,
+    /// True if the file did not fit in memory when it was mapped.
+    paged: bool,
+    /// Pages for which the program waited, and bytes that it read from storage; null where the
+    /// system does not tell.
+    page_faults: Option<u64>,
+    read_bytes: Option<u64>,
     objects: u32,
     objects_touched: usize,
     instances: u32,
@@ -48,6 +54,9 @@ impl Stats {
             file_bytes,
             mapped_bytes: if mapped.is_some() { file_bytes } else { 0 },
             resident_bytes: mapped.map_or(Some(file_bytes), resident),
+            paged: scene.file().is_paged(),
+            page_faults: page_faults(),
+            read_bytes: read_bytes(),
             objects: scene.object_count(),
             objects_touched: scene.touched_objects(),
             instances: scene.instance_count(),
@@ -64,6 +73,19 @@ fn resident(file: &Path) -> Option<u64> {
     let mut lines = maps.lines().skip_while(|line| !line.ends_with(path.to_str().unwrap_or("\0")));
     let line = lines.find(|line| line.starts_with("Rss:"))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib << 10)
+}
+
+/// Major page faults of this process, on Linux.
+fn page_faults() -> Option<u64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name of the program, which may have spaces, ends with the last parenthesis.
+    stat.rsplit_once(')')?.1.split_whitespace().nth(9)?.parse().ok()
+}
+
+/// Bytes that this process has made the system read from storage, on Linux.
+fn read_bytes() -> Option<u64> {
+    let io = std::fs::read_to_string("/proc/self/io").ok()?;
+    io.lines().find_map(|line| line.strip_prefix("read_bytes:"))?.trim().parse().ok()
 }
 
 /// Prints time and rays of the frames, for people or as JSON; on standard error when the pictures
@@ -165,9 +187,12 @@ fn table(report: &Report, stats: &Stats) -> String {
             f.instances_placed,
         ));
     }
-    let resident = stats.resident_bytes.map_or_else(|| "?".to_owned(), |b| b.to_string());
+    let known = |number: Option<u64>| number.map_or_else(|| "?".to_owned(), |number| number.to_string());
+    let [resident, faults, read] = [stats.resident_bytes, stats.page_faults, stats.read_bytes].map(known);
+    let paged = if stats.paged { ", larger than the memory" } else { "" };
     text.push_str(&format!(
-        "file {} bytes, mapped {}, resident {resident}; {} of {} objects touched; {} instances: {} bytes, hierarchy {} bytes\n",
+        "file {} bytes{paged}, mapped {}, resident {resident}; read {read} bytes, waited for {faults} pages\n\
+         {} of {} objects touched; {} instances: {} bytes, hierarchy {} bytes\n",
         stats.file_bytes,
         stats.mapped_bytes,
         stats.objects_touched,

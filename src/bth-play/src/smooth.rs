@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Triangles of an object beyond which it stays as it is: facets are smaller than pixels then.
-const MOST: usize = 20_000_000;
+const MOST: usize = 4_000_000;
 
 /// Length of a sum of normals, relative to one of them, below which they cancel out.
 const CANCELLED: f64 = 1e-6;

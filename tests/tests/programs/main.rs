@@ -15,6 +15,8 @@ mod materials;
 #[cfg(target_os = "linux")]
 mod memory;
 mod mistakes;
+#[cfg(target_os = "linux")]
+mod paging;
 mod pictures;
 mod pipelines;
 mod play;

@@ -33,8 +33,8 @@ fn picture_has_the_right_size_and_does_not_depend_on_threads() {
         assert!(!pictures.contains(&one), "{mode} looks like another mode");
         pictures.push(one);
     }
-    let mapped = picture(folder.path(), &["--map"]);
-    assert!(mapped == pictures[0]);
+    let read = picture(folder.path(), &["--read"]);
+    assert!(read == pictures[0]);
     let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names.len(), 3, "{names:?}");
 }

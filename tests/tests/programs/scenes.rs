@@ -336,7 +336,7 @@ fn manifests_are_written_beside_or_above_their_model_only() {
 fn objects_that_no_ray_comes_near_are_not_touched() {
     let folder = compiled();
     let touched = |camera: &str| {
-        let args = ["-o", "x.png", "--map", "--stats", "--json", "--mode", "normals", "--camera", camera];
+        let args = ["-o", "x.png", "--stats", "--json", "--mode", "normals", "--camera", camera];
         let json = play(folder.path(), &args).expect(0).json();
         let length = std::fs::metadata(folder.path().join("scene.bth")).unwrap().len();
         assert_eq!(json["stats"]["mapped_bytes"], length);

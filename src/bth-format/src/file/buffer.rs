@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::layout::{CacheLine, Header};
+use crate::memory;
 use memmap2::{Mmap, MmapMut};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -12,8 +13,8 @@ use zerocopy::IntoBytes;
 pub(super) enum Buffer {
     /// A copy in memory that this process allocated.
     Owned(Owned),
-    /// A mapping of the file, which starts at a page.
-    Mapped(Mmap),
+    /// A mapping of the file, which starts at a page; true if the file did not fit in memory.
+    Mapped(Mmap, bool),
 }
 
 /// Allocated memory, writable until the file has been read into it.
@@ -93,8 +94,13 @@ impl Buffer {
     pub(super) fn bytes(&self) -> &[u8] {
         match self {
             Buffer::Owned(owned) => owned.bytes(),
-            Buffer::Mapped(map) => map,
+            Buffer::Mapped(map, _) => map,
         }
+    }
+
+    /// True if the file is mapped and did not fit in memory when it was.
+    pub(super) fn is_paged(&self) -> bool {
+        matches!(self, Buffer::Mapped(_, true))
     }
 
     /// Copies the bytes of a file.
@@ -127,7 +133,8 @@ impl Buffer {
         Ok((Buffer::Owned(owned), length))
     }
 
-    /// Maps a whole file.
+    /// Maps a whole file. Where it does not fit in memory, only the pages are read that are used: rays
+    /// need pages here and there, and what was read around them would push out what they need.
     ///
     /// # Safety
     /// Until the buffer is dropped nobody, in this process or another, may write to the file,
@@ -143,9 +150,19 @@ impl Buffer {
         // references for its own lifetime only, and the caller promises that nobody changes or
         // shrinks the file before the buffer is dropped.
         let map = unsafe { Mmap::map(&file) }.map_err(|e| Error::io(path, e))?;
-        Ok(Buffer::Mapped(map))
+        let is_paged = length >= ASKED && length > memory::available();
+        if is_paged {
+            // The advice may be refused: then more is read, and all else is the same.
+            #[cfg(unix)]
+            let _ = map.advise(memmap2::Advice::Random);
+        }
+        Ok(Buffer::Mapped(map, is_paged))
     }
 }
+
+/// Bytes of a mapped file from which on it is asked how much memory there is. Opening a smaller one
+/// would take longer for it, and the system reads most of it at once.
+const ASKED: u64 = 32 << 20;
 
 /// Opens a regular file and returns its length in bytes. Pipes and devices, which may block or have
 /// no end, are refused before they are opened.

@@ -129,6 +129,13 @@ impl File {
         buffer.and_then(Self::new).map_err(|e| e.in_file(path))
     }
 
+    /// Returns true if the file is mapped and was larger than the [memory](crate::memory) that was
+    /// available then. Each page is read when it is needed, so threads wait for the disk, and more
+    /// threads than processors are faster.
+    pub fn is_paged(&self) -> bool {
+        self.buffer.is_paged()
+    }
+
     fn new(buffer: Buffer) -> Result<Self> {
         if cfg!(target_endian = "big") {
             return Err(Error::at(Code::Host, 0, "a little-endian machine", "a big-endian one"));
@@ -227,7 +234,7 @@ impl File {
 
     /// Returns true if the file is mapped, so that reading bytes may wait for the disk.
     pub fn is_mapped(&self) -> bool {
-        matches!(*self.buffer, Buffer::Mapped(_))
+        matches!(*self.buffer, Buffer::Mapped(..))
     }
 
     /// As [`Self::object`], made once and kept.

@@ -120,7 +120,12 @@ impl FrameRenderer<'_> {
             self.progress.tile_done();
             tile
         };
-        region.squares(self.args.size.0).into_par_iter().map(render).collect()
+        // Threads take one square after the other, so that all work in the same part of the picture
+        // and read the same part of the scene.
+        let squares = region.squares(self.args.size.0).into_iter().enumerate().par_bridge();
+        let mut tiles: Vec<(usize, Tile)> = squares.map(|(at, square)| (at, render(square))).collect();
+        tiles.sort_unstable_by_key(|(at, _)| *at);
+        tiles.into_iter().map(|(_, tile)| tile).collect()
     }
 }
 

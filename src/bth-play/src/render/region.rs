@@ -41,14 +41,19 @@ impl Region {
         Region { x: grow(&self.x, width), y: grow(&self.y, height) }
     }
 
-    /// The numbers of the squares that overlap it in a picture of this width.
+    /// The numbers of the squares that overlap it in a picture of this width, in Morton order, so that
+    /// successive ones are close to each other.
     pub(super) fn squares(&self, width: u32) -> Vec<u32> {
         if self.x.is_empty() || self.y.is_empty() {
             return Vec::new();
         }
         let across = |range: &Range<u32>| range.start / TILE..range.end.div_ceil(TILE);
         let columns = width.div_ceil(TILE);
-        across(&self.y).flat_map(|row| across(&self.x).map(move |column| row * columns + column)).collect()
+        let mut squares: Vec<u32> = across(&self.y)
+            .flat_map(|row| across(&self.x).map(move |column| row * columns + column))
+            .collect();
+        squares.sort_by_cached_key(|square| spread(square % columns) | spread(square / columns) << 1);
+        squares
     }
 
     /// The place of a pixel of the picture in this region, row by row; `None` outside.
@@ -56,6 +61,11 @@ impl Region {
         let inside = self.x.contains(&x) && self.y.contains(&y);
         inside.then(|| (y - self.y.start) as usize * self.size().0 as usize + (x - self.x.start) as usize)
     }
+}
+
+/// The bits of a number, with a zero above each.
+fn spread(number: u32) -> u64 {
+    (0..u32::BITS).fold(0, |sum, bit| sum | u64::from(number >> bit & 1) << (2 * bit))
 }
 
 #[cfg(test)]
@@ -76,7 +86,7 @@ mod tests {
     #[test]
     fn squares_are_all_that_overlap() {
         let region = Region { x: 15..33, y: 0..17 };
-        assert_eq!(region.squares(50), [0, 1, 2, 4, 5, 6]);
+        assert_eq!(region.squares(50), [0, 1, 4, 5, 2, 6]);
         assert_eq!(region.with_margin(20, (50, 30)), Region { x: 0..50, y: 0..30 });
         assert!(Region { x: 3..3, y: 0..9 }.squares(50).is_empty());
     }

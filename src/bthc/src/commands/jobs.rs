@@ -25,7 +25,7 @@ fn at_once(args: &Compile, jobs: usize) -> usize {
 
 /// Bytes that all jobs may take together.
 fn memory(args: &Compile) -> u64 {
-    args.jobs.memory.map_or_else(bth_files::memory::available, |mib| mib.saturating_mul(1 << 20))
+    args.jobs.memory.map_or_else(bth_format::memory::available, |mib| mib.saturating_mul(1 << 20))
 }
 
 /// Bytes that the objects of one of `jobs` jobs may take, if it is a scene.

@@ -120,8 +120,8 @@ fn thread_count(asked: usize, scene: &bth::Scene) -> usize {
 fn open(file: &Path, map: bool) -> Result<bth::Scene, bth::Error> {
     if map {
         // SAFETY: `map` requires that bthc wrote the file, and that nobody changes or shrinks it
-        // while it is mapped. Without `--read` the user guarantees this, as its help tells. Entries of
-        // the cache are read-only and are created by linking a finished file; no program of the
+        // while it is mapped. Without `--read` the user guarantees this, as its help tells. Entries
+        // of the cache are read-only and are created by linking a finished file; no program of the
         // workspace opens one for writing, and the hash of this one was compared with what bthc
         // wrote.
         unsafe { bth::map(file) }

@@ -133,8 +133,8 @@ impl Buffer {
         Ok((Buffer::Owned(owned), length))
     }
 
-    /// Maps a whole file. Where it does not fit in memory, only the pages are read that are used: rays
-    /// need pages here and there, and what was read around them would push out what they need.
+    /// Maps a whole file. Where it does not fit in memory, only the pages are read that are used:
+    /// rays need pages here and there, and reading around them would push out what they need.
     ///
     /// # Safety
     /// Until the buffer is dropped nobody, in this process or another, may write to the file,

@@ -41,8 +41,8 @@ impl Region {
         Region { x: grow(&self.x, width), y: grow(&self.y, height) }
     }
 
-    /// The numbers of the squares that overlap it in a picture of this width, in Morton order, so that
-    /// successive ones are close to each other.
+    /// The numbers of the squares that overlap it in a picture of this width, in Morton order, so
+    /// that successive ones are close to each other.
     pub(super) fn squares(&self, width: u32) -> Vec<u32> {
         if self.x.is_empty() || self.y.is_empty() {
             return Vec::new();

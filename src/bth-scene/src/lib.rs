@@ -12,6 +12,7 @@ mod joint_set;
 pub mod limits;
 mod model;
 mod names;
+mod node_tables;
 mod read;
 mod read_deformers;
 mod read_material;
@@ -19,6 +20,7 @@ mod read_path;
 mod read_sequence;
 mod read_tracks;
 mod read_transform;
+mod segments;
 mod table;
 mod write;
 
@@ -34,7 +36,7 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("frames", read::FRAMES_KEYS),
     ("object", read_sequence::OBJECT_KEYS),
     ("material", read_material::MATERIAL_KEYS),
-    ("node", read::NODE_KEYS),
+    ("node", node_tables::NODE_KEYS),
     ("camera", read::CAMERA_KEYS),
     ("light", read::LIGHT_KEYS),
     ("skin", read_deformers::SKIN_KEYS),

@@ -3,37 +3,54 @@
 use crate::error::{Result, code};
 use crate::limits::MAX_NAME;
 use crate::table::{Table, Value};
+use std::borrow::Cow;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 /// The names of one table.
 #[derive(Debug)]
 pub(crate) struct Names<'a> {
     what: &'static str,
-    rows: HashMap<&'a str, usize>,
+    rows: HashMap<Cow<'a, str>, usize>,
 }
 
 impl<'a> Names<'a> {
-    /// Collects the names of tables; fails on one that is empty or too long, holds control
-    /// characters or is used twice.
+    pub(crate) fn new(what: &'static str) -> Self {
+        Self { what, rows: HashMap::new() }
+    }
+
+    /// Collects the names of tables.
     pub(crate) fn collect(what: &'static str, tables: &[Table<'a>]) -> Result<Self> {
-        let mut rows = HashMap::with_capacity(tables.len());
-        for (row, table) in tables.iter().enumerate() {
-            let value = table.need("name")?;
-            let name = value.string()?;
-            if name.is_empty() || name.chars().any(char::is_control) {
-                let message = "expected a name without control characters";
-                return Err(value.error(code::NAME, message, "give it a name"));
+        let mut names = Self::new(what);
+        for table in tables {
+            names.add(table, Cow::Borrowed(table.need("name")?.string()?))?;
+        }
+        Ok(names)
+    }
+
+    /// Adds the name of the next table; fails on one that is empty or too long, holds control
+    /// characters or is used twice.
+    pub(crate) fn add(&mut self, table: &Table<'_>, name: Cow<'a, str>) -> Result<()> {
+        let what = self.what;
+        let error = |message: String, hint: &str| Err(table.need("name")?.error(code::NAME, message, hint));
+        if name.is_empty() || name.chars().any(char::is_control) {
+            return error("expected a name without control characters".to_owned(), "give it a name");
+        }
+        if name.len() > MAX_NAME {
+            let message = format!("expected a name of at most {MAX_NAME} bytes, found {}", name.len());
+            return error(message, "give it a shorter name");
+        }
+        let row = self.rows.len();
+        match self.rows.entry(name) {
+            Entry::Vacant(entry) => {
+                entry.insert(row);
+                Ok(())
             }
-            if name.len() > MAX_NAME {
-                let message = format!("expected a name of at most {MAX_NAME} bytes, found {}", name.len());
-                return Err(value.error(code::NAME, message, "give it a shorter name"));
-            }
-            if rows.insert(name, row).is_some() {
-                let message = format!("the {what} \"{name}\" is there already");
-                return Err(value.error(code::NAME, message, "give each one a name of its own"));
+            Entry::Occupied(entry) => {
+                let message = format!("the {what} \"{}\" is there already", entry.key());
+                error(message, "give each one a name of its own")
             }
         }
-        Ok(Self { what, rows })
     }
 
     /// The row that a value names.

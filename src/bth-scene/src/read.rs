@@ -6,22 +6,21 @@ use crate::joint_set::JointSet;
 use crate::limits::MAX_MANIFEST;
 use crate::model::*;
 use crate::names::Names;
+use crate::node_tables::NodeTables;
 use crate::read_deformers::{DEFORMER_KEYS, SKIN_KEYS, deformers, skin};
 use crate::read_material::{color, material};
 use crate::read_path::path;
 use crate::read_sequence::{OBJECT_KEYS, sequence, vertex_cache};
 use crate::read_tracks::{TRACK_KEYS, tracks};
 use crate::read_transform::transform;
+use crate::segments::Segments;
 use crate::table::{Document, Table, Value};
 use std::io::Read;
 use std::path::Path;
-use toml::de::DeTable;
 
 pub(crate) const SCENE_KEYS: &[&str] =
     &["version", "camera", "frames", "objects", "nodes", "cameras", "lights", "skins", "deformers", "tracks"];
 pub(crate) const FRAMES_KEYS: &[&str] = &["first", "last", "rate"];
-pub(crate) const NODE_KEYS: &[&str] =
-    &["name", "parent", "object", "group", "visible", "translation", "rotation", "scale", "matrix", "look"];
 pub(crate) const CAMERA_KEYS: &[&str] = &["name", "node", "fov", "height", "aspect", "near", "far"];
 pub(crate) const LIGHT_KEYS: &[&str] =
     &["name", "node", "kind", "color", "intensity", "range", "inner", "outer"];
@@ -34,20 +33,15 @@ const FRAME_LIMIT: i64 = 1 << 24;
 /// # Errors
 /// [`code::READ`] when it cannot be read, else the errors of [`parse`].
 pub fn read(path: &Path) -> Result<Manifest> {
-    let failed = |message: String, hint: &str| {
-        let path = path.to_owned();
-        Error { code: code::READ, path, line: 0, column: 0, message, hint: hint.to_owned() }
-    };
     let cannot =
-        |e: std::io::Error| failed(format!("cannot read: {e}"), "check the path and its permissions");
+        |e: std::io::Error| failed(path, format!("cannot read: {e}"), "check the path and its permissions");
     let file = bth_files::regular_file(path).and_then(|_| std::fs::File::open(path)).map_err(cannot)?;
     let mut bytes = Vec::new();
     // Reading one byte more than allowed detects longer files without trusting the size that the
     // system reports.
     file.take(MAX_MANIFEST + 1).read_to_end(&mut bytes).map_err(cannot)?;
     if bytes.len() as u64 > MAX_MANIFEST {
-        let message = format!("expected a manifest of at most {MAX_MANIFEST} bytes, found more");
-        return Err(failed(message, "is this a manifest? split the scene if it is"));
+        return Err(too_long(path));
     }
     let text = String::from_utf8(bytes).map_err(|e| not_utf8(path, &e))?;
     parse(&text, path)
@@ -58,7 +52,12 @@ fn not_utf8(path: &Path, error: &std::string::FromUtf8Error) -> Error {
     let (before, wrong) = error.as_bytes().split_at(error.utf8_error().valid_up_to());
     let text = std::str::from_utf8(before).unwrap_or_default();
     let message = format!("expected UTF-8, found the byte 0x{:02x}", wrong.first().unwrap_or(&0));
-    Document { path, text }.error(text.len()..text.len(), code::SYNTAX, message, "save the manifest as UTF-8")
+    Document { path, text, pieces: &[] }.error(
+        text.len()..text.len(),
+        code::SYNTAX,
+        message,
+        "save the manifest as UTF-8",
+    )
 }
 
 /// Reads the text of a manifest; `path` is for messages.
@@ -66,26 +65,28 @@ fn not_utf8(path: &Path, error: &std::string::FromUtf8Error) -> Error {
 /// # Errors
 /// One of [`code`], with line and column.
 pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
-    let doc = Document { path, text };
-    let root = DeTable::parse(text).map_err(|e| {
-        let message = e.message().trim_end().replace('\n', "; ");
-        doc.error(e.span().unwrap_or(0..0), code::SYNTAX, message, "correct the TOML there")
-    })?;
+    if text.len() as u64 > MAX_MANIFEST {
+        return Err(too_long(path));
+    }
+    let segments = Segments::of(text);
+    let doc = Document { path, text, pieces: &segments.pieces };
+    let root = doc.parse(&segments.rest)?;
     let scene = Table::new(doc, root.get_ref(), 0..0, SCENE_KEYS)?;
     check_version(&scene.need("version")?)?;
 
     let objects = scene.tables("objects", OBJECT_KEYS)?;
-    let nodes = scene.tables("nodes", NODE_KEYS)?;
+    let nodes = NodeTables::new(&scene, doc, &segments.nodes)?;
     let cameras = scene.tables("cameras", CAMERA_KEYS)?;
     let lights = scene.tables("lights", LIGHT_KEYS)?;
     let object_names = Names::collect("object", &objects)?;
-    let node_names = Names::collect("node", &nodes)?;
+    let node_names = nodes.names()?;
     let camera_names = Names::collect("camera", &cameras)?;
     Names::collect("light", &lights)?;
 
     let frames = scene.get("frames").map(|v| frames(&v)).transpose()?.unwrap_or_default();
     let camera = scene.get("camera").map(|v| camera_names.row(&v)).transpose()?;
-    let read_nodes = nodes.iter().map(|t| node(t, &node_names, &object_names)).collect::<Result<Vec<_>>>()?;
+    let read_node = |row| nodes.with(row, |table| node(table, &node_names, &object_names));
+    let read_nodes = (0..nodes.len()).map(read_node).collect::<Result<Vec<_>>>()?;
     check_cycles(&nodes, &read_nodes)?;
     let skins = scene.tables("skins", SKIN_KEYS)?;
     let skin_names = Names::collect("skin", &skins)?;
@@ -95,9 +96,9 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
     if let Some(groups) = node_groups(&nodes, &read_nodes)? {
         let skinned: Vec<_> = deformers.iter().filter(|of| of.skin.is_some()).map(|of| of.object).collect();
         let is_skinned = |node: &Node| node.object.is_some_and(|object| skinned.contains(&object));
-        let row = |(row, _): &(usize, &Table<'_>)| groups.is_in_group(*row) && is_skinned(&read_nodes[*row]);
-        if let Some((_, table)) = nodes.iter().enumerate().find(row) {
-            return Err(in_group(&table.need("object")?, "an object with a skin"));
+        let is_wrong = |row: &usize| groups.is_in_group(*row) && is_skinned(&read_nodes[*row]);
+        if let Some(row) = (0..nodes.len()).find(is_wrong) {
+            return nodes.with(row, |table| Err(in_group(&table.need("object")?, "an object with a skin")));
         }
         let others = [("a camera", &cameras), ("a light", &lights), ("a deformer", &deformer_tables)];
         for (what, table) in others.iter().flat_map(|(what, of)| of.iter().map(move |table| (what, table))) {
@@ -118,6 +119,17 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
         deformers,
         tracks,
     })
+}
+
+/// The error for a manifest that is too long.
+fn too_long(path: &Path) -> Error {
+    let message = format!("expected a manifest of at most {MAX_MANIFEST} bytes, found more");
+    failed(path, message, "is this a manifest? split the scene if it is")
+}
+
+fn failed(path: &Path, message: String, hint: &str) -> Error {
+    let path = path.to_owned();
+    Error { code: code::READ, path, line: 0, column: 0, message, hint: hint.to_owned() }
 }
 
 fn check_version(value: &Value<'_>) -> Result<()> {
@@ -233,16 +245,19 @@ fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>) -> Result<Nod
 
 /// The groups of nodes. Fails when a node with a parent is named as one, or groups show each other
 /// in a circle or too deeply.
-fn node_groups(tables: &[Table<'_>], nodes: &[Node]) -> Result<Option<NodeGroups>> {
-    for (table, node) in tables.iter().zip(nodes) {
+fn node_groups(tables: &NodeTables<'_>, nodes: &[Node]) -> Result<Option<NodeGroups>> {
+    let error = |row: usize, code: &'static str, message: String, hint: &'static str| {
+        tables.with(row, |table| Err(table.need("group")?.error(code, message, hint)))
+    };
+    for (row, node) in nodes.iter().enumerate() {
         if let Some(group) = node.group.map(|group| &nodes[group]).filter(|group| group.parent.is_some()) {
             let message = format!("the node \"{}\" has a parent: a group is a node without one", group.name);
-            return Err(table.need("group")?.error(code::CONFLICT, message, "name the first node of a tree"));
+            return error(row, code::CONFLICT, message, "name the first node of a tree");
         }
     }
     NodeGroups::of(nodes).or_else(|node| {
-        let message = "the group shows itself, or groups are nested in more than 16 levels";
-        Err(tables[node].need("group")?.error(code::CYCLE, message, "name another group"))
+        let message = "the group shows itself, or groups are nested in more than 16 levels".to_owned();
+        error(node, code::CYCLE, message, "name another group")
     })
 }
 
@@ -252,7 +267,7 @@ fn in_group(value: &Value<'_>, what: &str) -> Error {
 }
 
 /// Fails when a node is its own ancestor. Every node is visited once.
-fn check_cycles(tables: &[Table<'_>], nodes: &[Node]) -> Result<()> {
+fn check_cycles(tables: &NodeTables<'_>, nodes: &[Node]) -> Result<()> {
     const UNSEEN: usize = usize::MAX;
     let mut seen_from = vec![UNSEEN; nodes.len()];
     for start in 0..nodes.len() {
@@ -264,8 +279,8 @@ fn check_cycles(tables: &[Table<'_>], nodes: &[Node]) -> Result<()> {
         // A node that was visited from this same start closes a cycle.
         if let Some(at) = next.filter(|at| seen_from[*at] == start) {
             let message = format!("the node \"{}\" is its own ancestor", nodes[at].name);
-            let value = tables[at].need("parent")?;
-            return Err(value.error(code::CYCLE, message, "give one node of the circle another parent"));
+            let hint = "give one node of the circle another parent";
+            return tables.with(at, |table| Err(table.need("parent")?.error(code::CYCLE, message, hint)));
         }
     }
     Ok(())

@@ -10,10 +10,21 @@ use toml::de::{DeTable, DeValue};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Document<'a> {
     pub(crate) path: &'a Path,
+    /// The whole text.
     pub(crate) text: &'a str,
+    /// Where pieces of what is parsed begin, there and in the whole text.
+    pub(crate) pieces: &'a [(usize, usize)],
 }
 
 impl Document<'_> {
+    /// Parses a part of the text.
+    pub(crate) fn parse<'t>(&self, part: &'t str) -> Result<Spanned<DeTable<'t>>> {
+        DeTable::parse(part).map_err(|e| {
+            let message = e.message().trim_end().replace('\n', "; ");
+            self.error(e.span().unwrap_or(0..0), code::SYNTAX, message, "correct the TOML there")
+        })
+    }
+
     /// An error at a range of bytes.
     pub(crate) fn error(
         &self,
@@ -22,7 +33,9 @@ impl Document<'_> {
         message: impl Into<String>,
         hint: impl Into<String>,
     ) -> Error {
-        let before = self.text.get(..at.start).unwrap_or(self.text);
+        let piece = self.pieces.partition_point(|(start, _)| *start <= at.start);
+        let (there, here) = piece.checked_sub(1).map_or((0, 0), |piece| self.pieces[piece]);
+        let before = self.text.get(..here + at.start - there).unwrap_or(self.text);
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);
         Error {
             code,
@@ -155,6 +168,12 @@ impl<'a> Value<'a> {
 
     pub(crate) fn string(&self) -> Result<&'a str> {
         self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a string"))
+    }
+
+    /// The string as it is quoted in the text in which it was parsed, if it is the same there.
+    pub(crate) fn quoted_in<'t>(&self, text: &'t str) -> Option<&'t str> {
+        let Range { start, end } = self.value.span();
+        text.get(start + 1..end - 1).filter(|quoted| self.value.get_ref().as_str() == Some(quoted))
     }
 
     pub(crate) fn boolean(&self) -> Result<bool> {

@@ -62,7 +62,7 @@ fn a_scene_larger_than_the_memory_is_written_and_shown_only_where_there_is_memor
     assert!(size("s.bth") > 350 << 20);
     bthc(folder.path(), &["verify", "s.bth"]).expect(0);
 
-    for args in [&["s.bth", "-o", "s.png"][..], &["s.bth", "-o", "s.png", "--map"]] {
+    for args in [&["s.bth", "-o", "s.png"][..], &["s.bth", "-o", "s.png", "--read"]] {
         let run = limited(350 << 10, "bth-play", folder.path(), args).expect(5);
         assert!(run.stderr.contains("BTH-O001") && run.stderr.contains("ulimit -v"), "{run:?}");
     }
@@ -79,6 +79,6 @@ fn models_larger_than_the_memory_are_refused_by_their_headers() {
     file.set_len(bytes).unwrap();
     let run =
         limited(700 << 10, "bthc", folder.path(), &["compile", "large.ply", "--threads", "2"]).expect(5);
-    assert!(run.stderr.contains("BTH-L034: 4000000 triangles take about 667 MiB"), "{run:?}");
+    assert!(run.stderr.contains("BTH-L034: large.ply: 4000000 triangles take about 667 MiB"), "{run:?}");
     assert!(run.stderr.contains("--quality fast") && !folder.path().join("large.bth").exists(), "{run:?}");
 }

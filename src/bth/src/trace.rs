@@ -20,7 +20,6 @@ use crate::rays::{Hit, Hit64, PrimitiveRef, Start};
 use crate::scene::Scene;
 use crate::start_points;
 use crate::starts::world_ray::WorldRay;
-use crate::streams::{HitStreams, RayStreams};
 use crate::trace_ray::TraceRay;
 use crate::trace_ray::sealed::Traced;
 use crate::visible::{self, SegmentEnd};
@@ -65,46 +64,6 @@ impl Scene {
     #[inline]
     pub fn batch<'a, R: TraceRay>(&'a self, rays: &'a [R]) -> RayBatch<'a, R> {
         RayBatch::new(self, rays)
-    }
-
-    /// Like [`RayBatch::nearest`], from arrays into arrays.
-    ///
-    /// ```
-    /// use bth::{HitStreams, RayStreams};
-    ///
-    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
-    /// let scene = bth::from_bytes(CUBE)?;
-    /// let (half, below, zero, one) = ([0.5; 4], [-1.0; 4], [0.0; 4], [1.0; 4]);
-    /// let origin = [&[0.1, 0.2, 0.3, 1.4][..], &half, &below];
-    /// let rays = RayStreams { origin, direction: [&zero, &zero, &one], tmin: &[], tmax: &[] };
-    /// let (mut t, mut u, mut v) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-    /// let (mut instance, mut triangle) = ([0; 4], [0; 4]);
-    /// let (instance, triangle) = (&mut instance, &mut triangle);
-    /// let hits = HitStreams { t: &mut t, u: &mut u, v: &mut v, instance, triangle };
-    /// scene.nearest_streams(&rays, hits);
-    /// assert_eq!(t, [1.0, 1.0, 1.0, f32::INFINITY]);
-    /// # Ok::<(), bth::Error>(())
-    /// ```
-    ///
-    /// # Panics
-    /// If the arrays differ in length.
-    pub fn nearest_streams(&self, rays: &RayStreams<'_>, mut hits: HitStreams<'_>) {
-        hits.check_lengths(rays.len());
-        let mut block = Vec::new();
-        rays.in_blocks(|first, rays| {
-            block.resize(rays.len(), Hit::MISS);
-            self.batch(rays).nearest(&mut block);
-            hits.store(first, &block);
-        });
-    }
-
-    /// Like [`RayBatch::any`], from arrays.
-    ///
-    /// # Panics
-    /// If the arrays differ in length.
-    pub fn any_streams(&self, rays: &RayStreams<'_>, found: &mut [bool]) {
-        assert_eq!(found.len(), rays.len(), "as many results as rays");
-        rays.in_blocks(|first, rays| self.batch(rays).any(&mut found[first..first + rays.len()]));
     }
 
     /// The opacity of the triangle where a hit lies: [`Opacity::Opaque`] for triangles about which

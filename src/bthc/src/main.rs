@@ -3,9 +3,7 @@
 mod args;
 mod commands;
 mod deep;
-mod explain;
 mod failure;
-mod measure;
 mod output;
 mod overwrite;
 mod progress;

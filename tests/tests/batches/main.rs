@@ -3,8 +3,8 @@
 
 mod free_directions;
 
-use bth::rays::{Hit, PrimitiveRef, Ray, StartRay};
-use bth::{Accept, HitStreams, Isa, RayStreams, Scene, TraceRay};
+use bth::rays::{Hit, Ray, StartRay};
+use bth::{Accept, Isa, Scene, TraceRay};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
@@ -177,44 +177,6 @@ fn are_alike_in_parallel<R: TraceRay + std::fmt::Debug>(scene: &Scene, rays: &[R
     }
     assert_eq!(any_together, any_alone);
     assert!(any_alone.contains(&true) && any_alone.contains(&false));
-}
-
-#[test]
-fn streams_have_the_answers_of_batches() {
-    let _turn = turn();
-    let model = gyroid(2000);
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
-    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    // More rays than a block holds, and not a multiple of that.
-    let rays = assorted(&corners, 2_501, 6);
-    let count = rays.len();
-    let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
-    scene.batch(&rays).nearest(&mut hits);
-    scene.batch(&rays).any(&mut found);
-    let column = |of: &dyn Fn(&Ray) -> f32| rays.iter().map(of).collect::<Vec<_>>();
-    let [ox, oy, oz] = [0, 1, 2].map(|k| column(&|ray| ray.origin[k]));
-    let [dx, dy, dz] = [0, 1, 2].map(|k| column(&|ray| ray.direction[k]));
-    let (tmin, tmax) = (column(&|ray| ray.tmin), column(&|ray| ray.tmax));
-    let streams =
-        RayStreams { origin: [&ox, &oy, &oz], direction: [&dx, &dy, &dz], tmin: &tmin, tmax: &tmax };
-    let (mut t, mut u, mut v) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
-    let (mut instance, mut triangle) = (vec![0; count], vec![0; count]);
-    scene.nearest_streams(
-        &streams,
-        HitStreams { t: &mut t, u: &mut u, v: &mut v, instance: &mut instance, triangle: &mut triangle },
-    );
-    for i in 0..count {
-        let primitive = PrimitiveRef { instance: instance[i], triangle: triangle[i] };
-        assert_eq!(bits(&Hit { t: t[i], u: u[i], v: v[i], primitive }), bits(&hits[i]), "{:?}", rays[i]);
-    }
-    let mut of_streams = vec![false; count];
-    scene.any_streams(&streams, &mut of_streams);
-    assert_eq!(of_streams, found);
-    // Without ranges all rays begin at 0 and have no end.
-    let open: Vec<Ray> = rays.iter().map(|ray| Ray::new(ray.origin, ray.direction)).collect();
-    scene.batch(&open).any(&mut found);
-    scene.any_streams(&RayStreams { tmin: &[], tmax: &[], ..streams }, &mut of_streams);
-    assert_eq!(of_streams, found);
 }
 
 #[test]

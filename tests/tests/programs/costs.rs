@@ -119,14 +119,3 @@ fn free_directions_are_kept_if_asked_for_where_they_pay_and_fit() {
         assert!(each <= limit, "{each} {limit}");
     }
 }
-
-#[test]
-fn explain_measures_and_draws() {
-    let folder = folder(&[("ball.obj", &sphere(12))]);
-    let args = ["explain", "ball.obj", "--measure", "--picture", "out.png"];
-    let run = bthc(folder.path(), &[&args[..], &CHEAP[..]].concat()).expect(0);
-    assert!(run.stdout.contains("wrote out.png"), "{run:?}");
-    assert!(run.stdout.contains("measured") || run.stdout.contains("nothing to measure"), "{run:?}");
-    let png = std::fs::read(folder.path().join("out.png")).unwrap();
-    assert!(png.starts_with(b"\x89PNG") && png.len() > 5000, "{} bytes", png.len());
-}

@@ -163,46 +163,6 @@ fn marks_lists_crossing_triangles() {
 }
 
 #[test]
-fn explain_says_what_of_free_directions_compiling_keeps() {
-    let folder = folder(&[("ball.obj", &sphere(16)), ("crossing.obj", &crossing())]);
-    let mut all = Vec::new();
-    for model in ["ball.obj", "crossing.obj"] {
-        let json =
-            bthc(folder.path(), &["explain", model, "--json", "--free-picture", "free.png"]).expect(0).json();
-        let png = std::fs::read(folder.path().join("free.png")).unwrap();
-        assert!(png.starts_with(b"\x89PNG") && png.len() > 1000);
-        let args = ["compile", model, "--json", "--free-directions", "auto"];
-        let compiled = bthc(folder.path(), &args).expect(0).job();
-        assert_eq!(json["free_directions"]["kept"], compiled["report"]["free"]["kept"], "{json:#}");
-        all.push(json["free_directions"]["kept"].clone());
-    }
-    assert_eq!(all[0], "directions");
-}
-
-#[test]
-fn explain_tells_distances_of_models_of_any_size() {
-    let scaled = |factor: f32| {
-        let (mut positions, faces) = sphere_mesh(16);
-        positions.as_flattened_mut().iter_mut().for_each(|x| *x *= factor);
-        obj(&positions, &faces)
-    };
-    let folder =
-        folder(&[("ball.obj", &scaled(1.0)), ("small.obj", &scaled(1e-4)), ("tiny.obj", &scaled(1e-30))]);
-    let distances = |model: &str| {
-        let text = bthc(folder.path(), &["explain", model, "--free-picture", "free.png"]).expect(0).stdout;
-        let (_, rest) = text.split_once("up to the distances ").expect("distances");
-        let numbers = rest.split([',', ' ']).filter(|part| !part.is_empty()).take(3);
-        numbers.map(|number| number.parse::<f64>().expect("a number")).collect::<Vec<_>>()
-    };
-    let (ball, small) = (distances("ball.obj"), distances("small.obj"));
-    for (a, b) in ball.iter().zip(&small) {
-        assert!((b / a / 1e-4 - 1.0).abs() < 0.01, "{ball:?} and {small:?}");
-    }
-    // Beyond the range of the format none are kept.
-    assert_eq!(distances("tiny.obj"), [0.0; 3]);
-}
-
-#[test]
 fn explain_tells_why_nodes_were_chosen_or_refused() {
     let folder = folder(&[("ball.obj", &sphere(32)), ("crossing.obj", &crossing())]);
     let json = bthc(folder.path(), &["explain", "ball.obj", "--json"]).expect(0).json();

@@ -15,7 +15,7 @@ fn mistaken(program: &str, folder: &Path, args: &[&str]) -> Run {
 /// A program, its arguments, its exit code, and what the error must contain.
 type Mistake = (&'static str, &'static [&'static str], i32, &'static [&'static str]);
 
-const BTHC: [Mistake; 23] = [
+const BTHC: [Mistake; 22] = [
     ("bthc", &["nosuch"], 2, &["nosuch"]),
     ("bthc", &["compile", "ball.obj", "--nosuch"], 2, &["--nosuch"]),
     ("bthc", &["compile", "missing.obj"], 4, &["missing.obj", "BTH-O"]),
@@ -37,7 +37,6 @@ const BTHC: [Mistake; 23] = [
     ("bthc", &["--isa", "nosuch", "info", "ball.obj"], 2, &["nosuch"]),
     ("bthc", &["compile", "ball.obj", "--depfile", "-"], 2, &["--depfile", "not standard output"]),
     ("bthc", &["marks", "ball.obj", "--tris", "-"], 2, &["--tris", "not standard output"]),
-    ("bthc", &["explain", "ball.obj", "--picture", "-"], 2, &["--picture", "not standard output"]),
     ("bthc", &["trace", "a.bth", "a.rays", "-o", "-"], 2, &["--output", "not standard output"]),
 ];
 
@@ -135,8 +134,6 @@ fn outputs_never_replace_what_is_read() {
         &["compile", "s.manifest", "-o", "s.manifest"],
         &["compile", "a.obj", "--depfile", "a.obj"],
         &["compile", "a.obj", "-o", "b.bth", "--depfile", "b.bth"],
-        &["explain", "a.obj", "--picture", "./a.obj"],
-        &["explain", "a.obj", "--free-picture", "./a.obj"],
         &["marks", "a.obj", "--tris", "./a.obj"],
     ] {
         let run = bthc(path, args).expect(2);

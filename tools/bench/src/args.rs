@@ -2,7 +2,7 @@
 //! are here.
 
 use crate::rays::View;
-use crate::{accuracy, compare, load, paper, records, scenes, speed, stress, truth};
+use crate::{compare, load, paper, records, scenes, speed, stress, truth};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -26,8 +26,6 @@ pub(crate) enum Command {
     Record(records::RecordRows),
     /// Writes the summary of all records.
     Summary(records::Summary),
-    /// Run time and bytes against every kind of error, ours and rivals'.
-    Accuracy(accuracy::Accuracy),
     /// Wrong answers against time, for engines from package registries.
     Truth(truth::Truth),
     /// Hard rays and points on hard surfaces, every answer checked exactly.

@@ -5,7 +5,6 @@
 //! report of rows, which become Markdown, JSON and lines of `benchmarks/record`.
 #![warn(missing_docs)]
 
-mod accuracy;
 mod args;
 mod clock;
 mod compare;
@@ -62,14 +61,13 @@ pub fn run() -> ExitCode {
 fn measure(command: &Command) -> Result<(Report, &RunOptions)> {
     Ok(match command {
         Command::Speed(arguments) => (speed::measure(arguments)?, &arguments.run),
-        Command::Accuracy(arguments) => (accuracy::measure(arguments)?, &arguments.run),
         Command::Stress(arguments) => (stress::measure(arguments)?, &arguments.run),
         Command::Load(arguments) => (load::measure(arguments)?, &arguments.run),
         Command::Scenes(arguments) => (scenes::measure(arguments)?, &arguments.run),
         Command::Truth(arguments) => (truth::measure(arguments)?, &arguments.run),
         Command::Paper(arguments) => (paper::measure(arguments)?, &arguments.run),
         _ => bail!(
-            "expected a command that makes a report: speed, accuracy, truth, stress, load, scenes or paper"
+            "expected a command that makes a report: speed, truth, stress, load, scenes or paper"
         ),
     })
 }

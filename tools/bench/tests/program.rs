@@ -62,25 +62,6 @@ fn load_and_scenes_measure_ours() {
 }
 
 #[test]
-fn accuracy_finds_errors_of_rivals_only() {
-    let tracers = "bvh,bth,obvhs cwbvh,embree compact";
-    let (page, rows) = report(&["accuracy", "torus-knot:320", "blob:400", "--tracer", tracers]);
-    assert!(page.contains("embree compact: not measured"), "{page}");
-    let wrong = |engine: &str| {
-        ["false_misses", "leaks", "ghosts", "wrong_neighbours"].map(|kind| {
-            figure(&rows, engine, &format!("{kind} aimed"))
-                + figure(&rows, engine, &format!("{kind} ordinary"))
-        })
-    };
-    for engine in ["bvh", "bth"] {
-        assert_eq!(wrong(engine), [0.0; 4], "{engine}");
-    }
-    // Were there none here, nothing would be measured.
-    assert!(wrong("obvhs cwbvh") != [0.0; 4]);
-    assert!(figure(&rows, "bth", "error of t worst") < 0.51 && figure(&rows, "bth", "vertices") > 0.0);
-}
-
-#[test]
 fn truth_finds_no_wrong_answer_of_ours() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -164,7 +145,6 @@ fn mistakes_are_named_with_an_exit_code() {
         (1, "speed torus-knot:0", "torus-knot:0"),
         (1, "speed torus-knot --set primarily", "primarily"),
         (1, "speed torus-knot --isa avx1024", "avx1024"),
-        (1, "accuracy torus-knot --tracer embre", "embre"),
         (1, "truth --engine Embre", "Embre"),
         (1, "load missing.manifest", "missing.manifest"),
         (1, "load objects:missing", "objects:missing"),

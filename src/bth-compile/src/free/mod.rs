@@ -163,22 +163,6 @@ pub fn find(
     Ok((free, FreeReport { worth: of_auto, ..report }))
 }
 
-/// What [`KeepFree::Auto`] keeps of a mesh, and what it decides by.
-///
-/// # Errors
-/// Only [`crate::Error::Cancelled`].
-pub fn worthwhile(
-    mesh: &Mesh,
-    tree: &BinaryBvh,
-    options: &FreeOptions,
-    monitor: &dyn Monitor,
-) -> Result<(Kept, Worth)> {
-    let levels = levels(tree, options.reach);
-    let Some(wide) = Tree::new(mesh, tree) else { return Ok((Kept::None, Worth::default())) };
-    let mut around = Surroundings { mesh, order: &tree.order, tree: wide, levels, kept: Kept::None };
-    worth::worth(&mut around, tree, options, monitor)
-}
-
 /// Decides rows of the order of the BVH, in parallel by tasks.
 fn decide(
     around: &Surroundings<'_>,

@@ -23,7 +23,7 @@ pub(super) struct ChooseNodes<'a> {
 impl Stage for ChooseNodes<'_> {
     type Output = Option<(Choice, Option<CostReport>)>;
     const NAME: &'static str = "costs";
-    const VERSION: &'static str = "4";
+    const VERSION: &'static str = "5";
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         let Self { source, traced, marks, options } = self;

@@ -29,7 +29,7 @@ pub use crate::stage::StageTime;
 pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cached, dry_run};
 pub use direct::{compile_fast, compile_model_fast, fast_model};
 pub use limit::storage;
-pub use object::{Compiled, assemble};
+pub use object::Compiled;
 pub use report::{CompileReport, FileReport, MotionReport};
 pub use tree::build_tree;
 

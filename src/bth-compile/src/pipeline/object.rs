@@ -80,24 +80,6 @@ impl Stage for Collapse<'_> {
     }
 }
 
-/// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its
-/// nodes. For benchmarks, which store one tetrahedralization in several forms.
-///
-/// # Errors
-/// A limit of the format, cancellation.
-pub fn assemble(
-    mesh: &Mesh,
-    tree: &bvh::BinaryBvh,
-    built: &[tets::Leaf],
-    options: &CompileOptions,
-    monitor: &dyn Monitor,
-) -> Result<Compiled> {
-    let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone(), probabilities: None };
-    let collapse = Collapse { traced, leaves: built.to_vec(), free: None, motion: None, options };
-    let (object, _) = collapse.run(monitor)?;
-    Ok(object.file("{}".to_owned(), &[], options)?.0.into())
-}
-
 impl Object {
     /// The file with this object only, after the checks of a reader.
     pub(super) fn file(

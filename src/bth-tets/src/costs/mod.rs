@@ -30,5 +30,5 @@ pub use estimate::{Estimator, Start};
 pub use least_useful::{Weighed, least_useful};
 pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, SelectionOutcome, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
-pub use profile::{BvhCosts, Profile, TetCosts, Walk};
+pub use profile::{BvhCosts, Profile, Walk};
 pub use tet_walk::{TetWalker, Walked, mean_steps};

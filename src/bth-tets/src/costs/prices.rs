@@ -1,6 +1,6 @@
 //! Costs of a tetrahedralization by its size: time of rays, bytes, and time to make them.
 
-use super::profile::{BvhCosts, TetCosts};
+use super::profile::BvhCosts;
 use super::{CostOptions, Start, Walk};
 use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
 
@@ -15,7 +15,7 @@ pub(super) const LINES_THAT_HIT: f64 = 0.52;
 /// Prices under the options.
 pub(super) struct Prices<'a> {
     options: &'a CostOptions,
-    costs: &'a TetCosts,
+    costs: &'a Walk,
     record: RecordKind,
     /// Factor on the costs of tetrahedra.
     scale: f64,
@@ -27,7 +27,7 @@ const MICROSECOND: f64 = 1e-6;
 impl<'a> Prices<'a> {
     pub(super) fn new(options: &'a CostOptions, record: RecordKind) -> Self {
         let costs = options.profile.record(record);
-        let scale = options.c_tet.map_or(1.0, |c| c / costs.surface.step[0].max(f64::MIN_POSITIVE));
+        let scale = options.c_tet.map_or(1.0, |c| c / costs.step[0].max(f64::MIN_POSITIVE));
         Prices { options, costs, record, scale }
     }
 
@@ -57,25 +57,10 @@ impl<'a> Prices<'a> {
                 + VERTICES_PER_TRIANGLE * size_of::<TetVertex>() as f64)
     }
 
-    fn cost(&self, walk: &Walk, triangles: u32, steps: f64, hits: f64) -> f64 {
-        self.scale * walk.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
-    }
-
-    /// Nanoseconds of a ray that starts on a triangle of the node; `hits` is the share of such rays
-    /// that end at one.
-    pub(super) fn surface(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
-        self.cost(&self.costs.surface, triangles, steps, hits)
-    }
-
-    /// Nanoseconds of a ray that enters the node's box, sixteen rays at a time.
-    pub(super) fn outside(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
-        self.cost(&self.costs.outside, triangles, steps, hits)
-    }
-
-    /// Nanoseconds of a ray that enters the box of a leaf below a BVH node, where rays enter one by
-    /// one.
-    pub(super) fn alone(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
-        self.cost(&self.costs.alone, triangles, steps, hits)
+    /// Nanoseconds of a ray through the node's tetrahedra; `hits` is the share of such rays that end
+    /// at a triangle.
+    pub(super) fn walk(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.scale * self.costs.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
     }
 
     /// Steps of the node's tetrahedralization, estimated.

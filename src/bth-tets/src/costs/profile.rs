@@ -4,7 +4,7 @@ use bth_format::layout::RecordKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Times on one thread, nanoseconds a ray in batches unless stated otherwise.
+/// Times on one thread, nanoseconds a ray. Rays through the BVH are in batches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
@@ -14,8 +14,8 @@ pub struct Profile {
     pub isa: String,
     /// The BVH.
     pub bvh: BvhCosts,
-    /// Tetrahedra, by name of the record.
-    pub tets: BTreeMap<String, TetCosts>,
+    /// Walks through tetrahedra, one ray after the other, by name of the record.
+    pub tets: BTreeMap<String, Walk>,
     /// Sizes in bytes of the tetrahedra that the two costs of a step were measured on.
     pub bytes: [f64; 2],
     /// Tetrahedralization, microseconds a triangle.
@@ -37,18 +37,6 @@ pub struct BvhCosts {
     pub node: f64,
     /// A visit of a leaf of up to 16 triangles.
     pub block: f64,
-}
-
-/// Costs of walks through tetrahedra in one record.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TetCosts {
-    /// Entered through the box, sixteen rays at a time: where the tetrahedra are the whole object.
-    pub outside: Walk,
-    /// From a known triangle, sixteen rays at a time.
-    pub surface: Walk,
-    /// Entered through the box, ray by ray: where they are a leaf of a BVH.
-    pub alone: Walk,
 }
 
 /// Costs of a walk.
@@ -82,7 +70,7 @@ impl Default for Profile {
 
 impl Profile {
     /// Costs of a record.
-    pub fn record(&self, kind: RecordKind) -> &TetCosts {
+    pub fn record(&self, kind: RecordKind) -> &Walk {
         self.tets.get(kind.name()).or_else(|| self.tets.values().next()).expect("a test finds each record")
     }
 

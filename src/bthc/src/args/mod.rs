@@ -129,17 +129,6 @@ pub(crate) struct Explain {
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) selection: Selection,
-    /// Tetrahedralize the chosen nodes and measure, too: predicted costs next to measured ones.
-    #[arg(long)]
-    pub(crate) measure: bool,
-    /// Also draw the model, coloured by what its triangles are in and by what a bounce costs, as a
-    /// PNG.
-    #[arg(long, value_name = "FILE", value_parser = output_file())]
-    pub(crate) picture: Option<PathBuf>,
-    /// Also decide in which directions rays from triangles hit nothing, say what it costs, and draw
-    /// as a PNG which surfaces are free.
-    #[arg(long, value_name = "FILE", value_parser = output_file())]
-    pub(crate) free_picture: Option<PathBuf>,
     /// Nodes to show, largest first; 0 for all.
     #[arg(long, default_value_t = 20, value_name = "N")]
     pub(crate) top: usize,

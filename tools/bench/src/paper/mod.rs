@@ -19,7 +19,7 @@ use crate::report::{Head, Report, Subject};
 use crate::structures::{self, Use};
 use crate::tracer::Tracer;
 use anyhow::Result;
-use bth_compile::costs::{self, Profile, Select, TetCosts, Walk};
+use bth_compile::costs::{self, Profile, Select, Walk};
 use bth_compile::pipeline::{self, Structure};
 use bth_compile::{Silent, bvh, marks, tets};
 use bth_format::layout::RecordKind;
@@ -64,7 +64,7 @@ fn scalar_profile() -> Profile {
     for (stored, step) in [(TET32, [23.6, 30.5]), (TET20, [24.0, 29.1])] {
         let walk = Walk { entry: 77.0, hit: 0.0, step };
         let record = profile_record(stored).name().to_owned();
-        profile.tets.insert(record, TetCosts { outside: walk, surface: walk, alone: walk });
+        profile.tets.insert(record, walk);
     }
     profile
 }

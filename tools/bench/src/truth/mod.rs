@@ -1,9 +1,10 @@
 //! Wrong answers against time, for engines from package registries.
 //!
-//! `sets` and `instances` make the queries, `exact` answers them by rational arithmetic, `engines`
+//! `sets`, `aimed_rays` and `instances` make the queries, `exact` answers them by rational arithmetic, `engines`
 //! knows the engines and how each leaves a surface, `process` talks to those that are programs,
 //! `judge` compares, and `page` and `chart` show it.
 
+mod aimed_rays;
 mod chart;
 mod engines;
 mod exact;

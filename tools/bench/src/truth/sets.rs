@@ -1,8 +1,8 @@
 //! The sets of queries: seeded, and the same numbers for everybody.
 
+use super::aimed_rays::{self, Target};
 use super::exact::{ExactAnswer, Surface};
 use super::instances;
-use crate::accuracy::aimed_rays::{self, Target};
 use crate::model::{Model, position};
 use crate::rays::{Camera, cosine_weighted, on_sphere, perpendicular};
 use bth::Scene;
@@ -226,10 +226,10 @@ fn camera_rays(model: &Mesh32, count: usize) -> Vec<Question> {
 /// Rays exactly through vertices and middles of edges, in turn; a share of them at random instead.
 fn aimed_rays(model: &Mesh32, count: usize, random: f64) -> Vec<Question> {
     let model = measured(model);
-    let [vertices, edges] = [Target::Vertices, Target::Edges].map(|t| aimed_rays::set(&model, t, count / 2));
+    let [vertices, edges] = [Target::Vertices, Target::Edges].map(|t| aimed_rays::rays(&model, t, count / 2));
     let mut rng = Rng::new(5);
     let (middle, radius) = (model.bounds().center(), 0.55 * model.bounds().diagonal());
-    let both = vertices.rays.into_iter().zip(edges.rays).flat_map(|(a, b)| [a, b]);
+    let both = vertices.into_iter().zip(edges).flat_map(|(a, b)| [a, b]);
     let aimed = |ray| {
         if rng.unit_f64() >= random {
             return of_ray(&ray);

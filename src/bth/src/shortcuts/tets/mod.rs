@@ -1,22 +1,9 @@
 //! Walks of rays through the tetrahedra of tet leaves, in either record ([`records`]).
 //!
-//! The rest of the runtime sees a [`SpecialLeaf`](leaf::SpecialLeaf).
-//!
-//! A single ray is walked in f64 ([`walk`], [`flood`]). The rays of a batch are walked in f32,
-//! sixteen to a vector ([`batch`], [`queue`], [`lanes`], [`rounds`]), and in f64 where f32 does not
-//! decide ([`decide`]).
+//! The rest of the runtime sees a [`SpecialLeaf`](leaf::SpecialLeaf). A ray is walked in f64
+//! ([`walk`]), and where that does not decide, all tetrahedra near its line are visited ([`flood`]).
 
-mod batch;
-mod decide;
-mod exit_lanes;
 mod flood;
-mod lanes;
 pub(super) mod leaf;
-mod queue;
-mod reached;
 mod records;
-mod rounds;
-mod starts;
 mod walk;
-mod walks;
-pub(super) mod whole;

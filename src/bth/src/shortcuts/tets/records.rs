@@ -1,4 +1,4 @@
-//! One interface to the two records of tetrahedra, for one tetrahedron and for sixteen.
+//! One interface to the two records of tetrahedra.
 //!
 //! A record is read only after a walk has entered its tetrahedron through a face, so the three
 //! vertices of the face and the link behind it are known. The record yields the fourth vertex and
@@ -9,10 +9,8 @@
 //! acceleration structures for ray tracing", 2021 (arXiv 2103.02309). `Link32` has 32 bytes. Each
 //! of its links stores the fourth vertex of the tetrahedron that it leads to.
 
-use crate::simd::Simd;
 use bth_format::layout::{Link, NONE, Tet16};
 use bth_format::object::Records;
-use zerocopy::{FromBytes, IntoBytes};
 
 /// The face through which a walk entered a tetrahedron, and the fourth vertex of the tetrahedron.
 #[derive(Clone, Copy, Debug)]
@@ -84,112 +82,4 @@ impl ReadRecords for Records<'_> {
             Records::None => Link { next: NONE, opposite: NONE },
         }
     }
-}
-
-/// The tetrahedra of sixteen walks, one in each lane, and the faces through which they were
-/// entered. The fields are the same as in [`Entered`].
-#[derive(Clone, Copy)]
-pub(crate) struct EnteredLanes<S: Simd> {
-    pub(crate) tet: S::U,
-    pub(crate) face: [S::U; 3],
-    /// The `opposite` of the link that was followed, where the fourth vertex is not yet known.
-    pub(crate) apex: S::U,
-    pub(crate) behind: S::U,
-    /// 1 in every lane. It is a variable, because the compiler replaces the masked addition of a
-    /// constant by slower code.
-    pub(crate) one: S::U,
-}
-
-impl<S: Simd> EnteredLanes<S> {
-    /// Like [`Entered::rank`], for a vertex in each lane.
-    #[inline(always)]
-    fn rank(&self, s: S, vertex: S::U) -> S::U {
-        let mut rank = s.splat_u(0);
-        for v in [self.apex, self.face[0], self.face[1], self.face[2]] {
-            rank = s.add_where(rank, s.lt_u(v, vertex), self.one);
-        }
-        rank
-    }
-}
-
-/// The fourth vertex in each lane. `xor` holds the index of the word that stores the exclusive or
-/// of all four vertices.
-#[inline(always)]
-fn fourth_vertices<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, xor: S::U) -> S::U {
-    let [a, b, c] = entered.face;
-    s.xor_u(s.xor_u(s.gather_u(m, words, xor), a), s.xor_u(b, c))
-}
-
-/// The words of [`Records`], for gathers in sixteen lanes. The record is tested at every step, so
-/// that one kernel serves both; the branch is well predicted.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum LaneRecords<'a> {
-    Link32(&'a [[u32; 2]]),
-    Tet16(&'a [u32]),
-}
-
-/// Records as a slice of words, or of pairs of words.
-fn words<T: FromBytes + zerocopy::Immutable>(
-    records: &(impl IntoBytes + zerocopy::Immutable + ?Sized),
-) -> &[T] {
-    <[T]>::ref_from_bytes(records.as_bytes()).ok().expect("records are a whole number of words")
-}
-
-impl<'a> LaneRecords<'a> {
-    /// None if there are no records.
-    pub(crate) fn new(records: Records<'a>) -> Option<Self> {
-        Some(match records {
-            Records::None => return None,
-            Records::Link32(records) => LaneRecords::Link32(words(records)),
-            Records::Tet16(records) => LaneRecords::Tet16(words(records)),
-        })
-    }
-
-    /// Returns true if the record needs [`EnteredLanes::behind`].
-    #[inline(always)]
-    pub(crate) fn needs_behind(&self) -> bool {
-        matches!(self, LaneRecords::Tet16(_))
-    }
-
-    /// Like [`ReadRecords::apex`], in the lanes of the mask. Other lanes are undefined.
-    #[inline(always)]
-    pub(crate) fn apex<S: Simd>(&self, s: S, m: S::M, entered: &EnteredLanes<S>) -> S::U {
-        match self {
-            LaneRecords::Link32(_) => entered.apex,
-            LaneRecords::Tet16(words) => fourth_vertices(s, words, m, entered, s.shl_u::<2>(entered.tet)),
-        }
-    }
-
-    /// `next` and `opposite` of [`ReadRecords::link`], in the lanes of the mask. Other lanes are
-    /// undefined.
-    #[inline(always)]
-    pub(crate) fn link<S: Simd>(
-        &self,
-        s: S,
-        m: S::M,
-        entered: &EnteredLanes<S>,
-        vertex: S::U,
-    ) -> (S::U, S::U) {
-        match self {
-            LaneRecords::Link32(pairs) => {
-                s.gather_pair(m, pairs, s.add_u(s.shl_u::<2>(entered.tet), entered.rank(s, vertex)))
-            }
-            LaneRecords::Tet16(words) => (decode_links(s, words, m, entered, vertex), s.splat_u(NONE)),
-        }
-    }
-}
-
-/// Like [`decode_link`], in each lane.
-#[inline(always)]
-fn decode_links<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, vertex: S::U) -> S::U {
-    let first = s.add_u(s.shl_u::<2>(entered.tet), s.splat_u(1));
-    // The first round turns the link behind the entered face into the fourth link, the second round
-    // the fourth into the requested one.
-    let mut link = entered.behind;
-    for v in [entered.apex, vertex] {
-        let rank = entered.rank(s, v);
-        let stored = s.and(m, s.lt_u(rank, s.splat_u(3)));
-        link = s.xor_u(link, s.gather_u(stored, words, s.add_u(first, rank)));
-    }
-    link
 }

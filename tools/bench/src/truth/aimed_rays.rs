@@ -1,7 +1,6 @@
 //! Rays aimed exactly at vertices and at middles of edges.
 
 use crate::model::Model;
-use crate::rays::RaySet;
 use bth::rays::Ray;
 use bth_random::Rng;
 
@@ -11,34 +10,24 @@ const EDGE_TRIES: usize = 1000;
 
 /// What is aimed at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Target {
+pub(super) enum Target {
     /// Vertices.
     Vertices,
     /// Middles of edges.
     Edges,
 }
 
-impl Target {
-    /// Name of the ray set.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Target::Vertices => "vertices",
-            Target::Edges => "edges",
-        }
-    }
-}
-
-/// A set of such rays. Each passes through its target at t = 1 without any rounding.
-pub(crate) fn set(model: &Model, target: Target, count: usize) -> RaySet {
+/// Such rays. Each passes through its target at t = 1 without any rounding.
+pub(super) fn rays(model: &Model, target: Target, count: usize) -> Vec<Ray> {
     let mut rng = Rng::new(11 + target as u64);
     let diagonal = model.bounds().diagonal();
     let mut rays = Vec::with_capacity(count);
     while rays.len() < count {
-        // A model without a single usable edge has a shorter set.
+        // A model without a single usable edge has fewer.
         let Some(point) = (0..EDGE_TRIES).find_map(|_| point(model, target, &mut rng)) else { break };
         rays.extend(through(point, diagonal, &mut rng));
     }
-    RaySet { name: target.name(), any: false, coherent: false, rays, starts: None }
+    rays
 }
 
 fn point(model: &Model, target: Target, rng: &mut Rng) -> Option<[f32; 3]> {
@@ -96,9 +85,9 @@ mod tests {
     fn rays_meet_their_targets_in_exact_arithmetic() {
         let model = Model::load("torus-knot:320").unwrap();
         for target in [Target::Vertices, Target::Edges] {
-            let set = set(&model, target, 100);
-            assert_eq!(set.rays.len(), 100);
-            for ray in &set.rays {
+            let rays = rays(&model, target, 100);
+            assert_eq!(rays.len(), 100);
+            for ray in &rays {
                 let at_one = |t| {
                     let at = bth_oracle::intersection(ray, model.mesh.corners(t));
                     at.is_some_and(|at| bth_oracle::to_f64(&at.t) == 1.0)

@@ -36,16 +36,6 @@ impl<'py> Keywords<'_, 'py> {
         Ok(Some(value))
     }
 
-    /// A positive finite number.
-    fn positive(&self, name: &str) -> PyResult<Option<f64>> {
-        match self.value::<f64>(name)? {
-            Some(x) if !(x.is_finite() && x > 0.0) => {
-                Err(PyValueError::new_err(format!("{name}: expected a number above 0, got {x}")))
-            }
-            x => Ok(x),
-        }
-    }
-
     /// A whole number in a range.
     pub(crate) fn within(&self, name: &str, range: RangeInclusive<u64>) -> PyResult<Option<u64>> {
         let number = self.value::<i128>(name)?;
@@ -178,10 +168,8 @@ fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyRes
     if let Some(quality) = keywords.choice("quality", &quality)? {
         options.bvh.quality = quality;
     }
-    let costs = &mut options.costs;
-    costs.max_bytes_per_triangle = keywords.positive("max_bytes_per_triangle")?;
     if let Some(arrays) = keywords.value::<RayArrays<'_>>("rays")? {
-        costs.rays = Some(Arc::new(known_rays(&arrays)?));
+        options.costs.rays = Some(Arc::new(known_rays(&arrays)?));
     }
     for (key, value) in keywords.value::<BTreeMap<String, Bound<'_, PyAny>>>("settings")?.unwrap_or_default()
     {

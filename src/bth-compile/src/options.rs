@@ -189,11 +189,6 @@ impl CompileOptions {
         let message = format!("an object can be deformable or be compiled with {excluded}, not both");
         Err(bth_import::Error::Limit { code: "BTH-L033", message })
     }
-
-    /// How tetrahedra will be stored; the size of the object without them is not set.
-    pub fn storage(&self) -> costs::Storage {
-        costs::Storage { record: self.record, plain_bytes: None }
-    }
 }
 
 /// How objects whose vertices move by themselves are compiled.

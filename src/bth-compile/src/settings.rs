@@ -18,13 +18,7 @@ struct Key {
     apply: fn(&str, &mut CompileOptions) -> Result<(), String>,
 }
 
-const KEYS: [Key; 12] = [
-    Key {
-        name: "budget",
-        values: "SECONDS",
-        about: "time of one thread for tetrahedralization, as the profile estimates it",
-        apply: |text, options| set(&mut options.costs.budget, positive(text).map(Some)),
-    },
+const KEYS: [Key; 11] = [
     Key {
         name: "c-tet",
         values: "NANOSECONDS",

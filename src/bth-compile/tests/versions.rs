@@ -5,6 +5,7 @@
 
 use bth_cache::Store;
 use bth_compile::cached::Cache;
+use bth_compile::costs::Select;
 use bth_compile::pipeline::{CompileOptions, Structure, compile_cached};
 use std::fmt::Write;
 use std::path::Path;
@@ -45,8 +46,10 @@ fn made(folder: &Path) -> String {
         let mut options = CompileOptions { structure, ..CompileOptions::default() };
         // No node is large enough: whether there is a worker makes no difference.
         options.costs.minimum_triangles = 1 << 20;
-        // Under a limit nodes are marked whatever they can gain.
-        options.costs.budget = (structure == Structure::Bth).then_some(1.0);
+        // With the paper's rule nodes are marked whatever they can gain.
+        if structure == Structure::Bth {
+            options.costs.select = Select::Paper;
+        }
         let cache = Cache::new(&store, "model");
         compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
     }

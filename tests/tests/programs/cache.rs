@@ -108,20 +108,6 @@ fn one_option_redoes_what_depends_on_it_and_says_so() {
     assert!(misses.starts_with(&["file".into(), "bvh".into(), "marks".into()]), "{misses:?}");
 }
 
-#[test]
-fn the_limit_on_bytes_tells_files_apart_that_have_no_tetrahedra() {
-    let folder = folder(&[("a.obj", &sphere(24))]);
-    let args = ["a.obj", "-o", "a.bth", "--structure", "bvh", "--free-directions", "auto"];
-    let limit = ["--max-bytes-per-triangle", "40"];
-    compile(folder.path(), &args);
-    let free = std::fs::read(folder.path().join("a.bth")).unwrap();
-    compile(folder.path(), &[&args[..], &limit].concat());
-    let limited = std::fs::read(folder.path().join("a.bth")).unwrap();
-    assert!(limited.len() < free.len(), "{} and {}", limited.len(), free.len());
-    compile(folder.path(), &args);
-    assert!(std::fs::read(folder.path().join("a.bth")).unwrap() == free);
-}
-
 /// As on a disc or an image of a disk, which keep no empty folders.
 #[cfg(target_os = "linux")]
 #[test]

@@ -74,14 +74,11 @@ pub struct FreeOptions {
     /// The second of three distances that are told apart, an eighth of it, it and four times it,
     /// relative to the diagonal of the object's box.
     pub reach: f64,
-    /// Largest size of a row in bytes: [`KeepFree::Auto`] keeps nothing that takes more for each
-    /// triangle.
-    pub row_bytes: usize,
 }
 
 impl Default for FreeOptions {
     fn default() -> Self {
-        FreeOptions { keep: KeepFree::default(), reach: 1.0 / 16.0, row_bytes: size_of::<FreeDirections>() }
+        FreeOptions { keep: KeepFree::default(), reach: 1.0 / 16.0 }
     }
 }
 
@@ -133,7 +130,7 @@ pub fn find(
         KeepFree::All => Kept::Directions,
         KeepFree::Distances => Kept::Distances,
         KeepFree::Auto => {
-            let (kept, known) = worth::worth(&mut around, tree, options, monitor)?;
+            let (kept, known) = worth::worth(&mut around, tree, monitor)?;
             of_auto = Some(known);
             kept
         }

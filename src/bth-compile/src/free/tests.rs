@@ -373,25 +373,3 @@ fn huge_and_tiny_meshes_have_no_free_directions() {
     let free = free_of(&Mesh::default());
     assert_eq!((free.levels, free.directions.len()), ([0.0; 3], 0));
 }
-
-#[test]
-fn what_has_no_room_is_left_out() {
-    let mesh = sphere(24, [0.0; 3]);
-    let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
-    let of = |keep: KeepFree, row_bytes: usize| {
-        let options = FreeOptions { keep, row_bytes, ..FreeOptions::default() };
-        let (free, report) = find(&mesh, &tree, &options, &Silent).unwrap();
-        let rows = [free.directions.len(), free.distances.len()];
-        assert_eq!(
-            rows,
-            [Kept::Directions, Kept::Distances]
-                .map(|kept| { usize::from(report.kept == kept) * mesh.triangles.len() })
-        );
-        report.kept
-    };
-    assert_eq!(of(KeepFree::Auto, 20), Kept::Directions);
-    assert_eq!(of(KeepFree::Auto, 19), Kept::Distances);
-    assert_eq!(of(KeepFree::Auto, 7), Kept::None);
-    // Who asks for it gets it.
-    assert_eq!(of(KeepFree::All, 0), Kept::Directions);
-}

@@ -8,13 +8,13 @@
 
 use super::frame::{beyond, share};
 use super::search::{Found, Surroundings};
-use super::{FreeOptions, Kept, decide};
+use super::{Kept, decide};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::sampling::{SampleRay, affordable, outside, walk, within};
 use crate::vectors::{corners, double_area};
-use bth_format::layout::{FreeBins, FreeDirections, FreeDistances};
+use bth_format::layout::FreeBins;
 use bth_import::Mesh;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -101,13 +101,9 @@ struct RayHit {
 pub(super) fn worth(
     around: &mut Surroundings<'_>,
     tree: &BinaryBvh,
-    options: &FreeOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Kept, Worth)> {
     let mut worth = Worth::default();
-    if options.row_bytes < size_of::<FreeDistances>() {
-        return Ok((Kept::None, worth));
-    }
     let count = (tree.order.len() / TRIANGLES_A_RAY).clamp(RAYS[0], RAYS[1]);
     let root = &tree.nodes[0];
     let all = outside(root.lower, root.upper, count, 1);
@@ -124,9 +120,6 @@ pub(super) fn worth(
     (worth.from_outside, worth.from_within) = (seen(&from_outside), seen(&from_within));
     if !worth.is_open() {
         return Ok((Kept::None, worth));
-    }
-    if options.row_bytes < size_of::<FreeDirections>() {
-        return Ok((Kept::Distances, worth));
     }
     around.kept = Kept::Directions;
     let of_row = decide_met(around, &from_outside, monitor)?;

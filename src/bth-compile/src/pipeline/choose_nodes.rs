@@ -1,6 +1,5 @@
 //! Choice of the nodes to tetrahedralize, by structure: none, those with a gain, or the root.
 
-use super::limit;
 use super::traced::TracedMesh;
 use crate::costs::{self, Choice, CostReport};
 use crate::error::{Error, Place, Result};
@@ -28,14 +27,13 @@ impl Stage for ChooseNodes<'_> {
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         let Self { source, traced, marks, options } = self;
         let (mesh, tree) = (&traced.mesh, &traced.tree);
-        let storage = || limit::storage_of(traced.by_ref(), options, monitor);
         let found = match (options.structure, marks) {
             (Structure::Bth, Some(marks)) => {
-                let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, storage()?, monitor)?;
+                let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, options.record, monitor)?;
                 Some((choice, Some(report)))
             }
             (Structure::Bth, None) if options.costs.more_suitable_gain_more() => {
-                let (choice, report) = costs::choose_of_all(mesh, tree, &options.costs, storage()?, monitor)?;
+                let (choice, report) = costs::choose_of_all(mesh, tree, &options.costs, options.record, monitor)?;
                 choice.chosen.is_empty().then_some((choice, Some(report)))
             }
             (Structure::Tets, Some(marks)) => match marks.suitable.first() {

@@ -2,9 +2,8 @@
 
 use super::compiler::Compiler;
 use super::keys;
-use super::limit::warn_over_limit;
 use super::object::Compiled;
-use super::report::{CompileReport, FileReport};
+use super::report::CompileReport;
 use crate::cached::{Cache, Miss, replay, with_warnings};
 use crate::error::{Error, Result};
 use crate::monitor::{Monitor, Recording};
@@ -14,7 +13,7 @@ use crate::stage::Clock;
 use crate::write::Content;
 use bth_cache::{Key, Record};
 use bth_import::import_triangles;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 use std::cell::OnceCell;
 use std::path::Path;
@@ -163,7 +162,7 @@ fn compile_source(
     let mut clock = Clock::default();
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
     let model = Model { path: source.path(), digest: &digest };
-    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, |monitor| {
+    compile_or_fetch(cache, key.as_ref(), needed, monitor, |monitor| {
         let mut compiler =
             Compiler { source: model.path, part: "", options, cache, clock: &mut clock, monitor };
         let imported = match source {
@@ -176,11 +175,7 @@ fn compile_source(
         };
         let (file, report) = compiler.file(&model, imported)?;
         Ok((file.into(), report, true))
-    })?;
-    if let Ok(file) = FileReport::deserialize(&outcome.report["file"]) {
-        warn_over_limit(&file, options, monitor);
-    }
-    Ok(outcome)
+    })
 }
 
 /// Hashes a source. Returns its key too, if the compiled file may be kept.

@@ -5,7 +5,6 @@ use super::choose_nodes::ChooseNodes;
 use super::free_directions::FindFree;
 use super::hashed::Hashed;
 use super::import::Import;
-use super::limit::{self, FitLimit};
 use super::marks::Mark;
 use super::moving::{self, BuildPoses, PoseSource, warn_of_options};
 use super::object::{Collapse, Object};
@@ -134,7 +133,7 @@ impl<'a> Compiler<'a> {
             Structure::Bvh => (Vec::new(), TetReports::default()),
             Structure::Bth | Structure::Tets => self.tet_leaves(&traced, hash)?,
         };
-        let (free, free_report) = self.free_directions(&traced, &leaves, hash)?;
+        let (free, free_report) = self.free_directions(&traced, hash)?;
         let coordinates = traced.on_grid.as_ref().map(crate::coordinates::OnGrid::report);
         let (object, collapse) = self.run(Collapse { traced, leaves, free, motion: None, options })?;
         Ok((object, StageReports { coordinates, bvh, free: free_report, tets, collapse }))
@@ -175,31 +174,23 @@ impl<'a> Compiler<'a> {
         let chosen = &choice.chosen[..];
         let (built, report) = self.run(Tetrahedralize { source, mesh, tree, chosen, options, cache })?;
         (reports.costs, reports.tets) = (costs, Some(report));
-        let (mut leaves, mut probe) = self.run(Probe { mesh, tree, built, options })?;
-        if let Some(most) = limit::bytes_per_triangle(options) {
-            (leaves, probe) = self.run(FitLimit { traced, most, leaves, choice: &choice, probe, options })?;
-        }
+        let (leaves, probe) = self.run(Probe { mesh, tree, built, options })?;
         reports.probe = probe;
         Ok((leaves, reports))
     }
 
     /// Decides in which directions rays from a triangle hit nothing. A tetrahedralization of the
     /// whole model has no leaves in which its triangles could be found, and deformable objects get
-    /// no free directions. With [`free::KeepFree::Auto`] they stay within the limit on bytes.
+    /// no free directions.
     fn free_directions(
         &mut self,
         traced: &TracedMesh,
-        leaves: &[tets::Leaf],
         hash: &OnceCell<Digest>,
     ) -> Result<(Option<Free>, Option<FreeReport>)> {
-        let Self { options, monitor, .. } = *self;
-        let mut free = options.free;
-        let is_wanted = free.keep != free::KeepFree::None;
-        if !is_wanted || options.structure == Structure::Tets || options.deformable {
+        let options = self.options;
+        let free = options.free;
+        if free.keep == free::KeepFree::None || options.structure == Structure::Tets || options.deformable {
             return Ok((None, None));
-        }
-        if free.keep == free::KeepFree::Auto {
-            free.row_bytes = limit::row_bytes(traced, leaves, options, monitor)?.min(free.row_bytes);
         }
         let TracedMesh { mesh, tree, .. } = traced;
         let built = BuildTree { mesh: Hashed { mesh, known: hash }, options: TreeOptions::of(options) };

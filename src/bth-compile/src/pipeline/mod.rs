@@ -1,5 +1,5 @@
 //! The compilation of a model: import → coordinates → BVH → visits → costs → marks → tets → probe →
-//! limit → free directions → collapse → file.
+//! free directions → collapse → file.
 //!
 //! `compiler` calls the stages in order; each is a `Stage` (`stage.rs`) in a separate file.
 //! `compile` is the way in, for a model in a file or in memory, with or without a cache.
@@ -13,7 +13,6 @@ mod free_directions;
 mod hashed;
 mod import;
 mod keys;
-mod limit;
 mod marks;
 mod moving;
 mod object;
@@ -28,7 +27,6 @@ pub use crate::options::{CompileOptions, MotionOptions, Structure};
 pub use crate::stage::StageTime;
 pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cached, dry_run};
 pub use direct::{compile_fast, compile_model_fast, fast_model};
-pub use limit::storage;
 pub use object::Compiled;
 pub use report::{CompileReport, FileReport, MotionReport};
 pub use tree::build_tree;

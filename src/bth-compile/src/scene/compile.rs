@@ -17,7 +17,6 @@ use bth_cache::{Key, Record};
 use bth_format::SceneView;
 use bth_format::groups::Groups;
 use bth_scene::Manifest;
-use serde::Deserialize;
 use std::path::Path;
 
 /// Compiles a scene; paths of the manifest count from `folder`, `name` names the scene in messages.
@@ -94,15 +93,12 @@ pub(super) fn through_cache(
     clock: Clock,
     policy: CachePolicy<'_>,
 ) -> Result<CachedCompilation<SceneReport>> {
-    let Context { options, cache, monitor, .. } = *context;
+    let Context { cache, monitor, .. } = *context;
     let key = key(manifest, plan, context)?;
-    let outcome = compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, |monitor| {
+    compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, |monitor| {
         let (content, report) = build(manifest, plan, name, &context.with_monitor(monitor), clock)?;
         Ok((content, report, policy.whole))
-    })?;
-    let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
-    warn_over_limit(&objects, options, monitor);
-    Ok(outcome)
+    })
 }
 
 /// Warns of nodes that are hidden because a scale is 0.
@@ -116,22 +112,6 @@ fn warn_of_flattened(manifest: &Manifest, monitor: &dyn Monitor) {
             first.escape_debug()
         ));
     }
-}
-
-/// Warns if objects are over the limit on bytes.
-fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions, monitor: &dyn Monitor) {
-    let Some(most) = options.costs.max_bytes_per_triangle else { return };
-    let each = |o: &ObjectReport| o.resident_bytes as f64 / o.triangles.max(1) as f64;
-    let over: Vec<&ObjectReport> = objects.iter().filter(|o| each(o) > most).collect();
-    let Some(worst) = over.iter().max_by(|a, b| each(a).total_cmp(&each(b))) else { return };
-    monitor.warn(&format!(
-        "{} of {} objects take more bytes a triangle than the limit of {most} allows, even without tetrahedra; the most \
-         takes {}: {:.1}",
-        over.len(),
-        objects.len(),
-        worst.names.first().map_or("an object", String::as_str),
-        each(worst)
-    ));
 }
 
 /// Compiles part `shard.0` (from 1) of `shard.1` parts of a scene's objects into the cache. Returns

@@ -10,7 +10,6 @@ mod bottom_up;
 mod choose;
 mod estimate;
 mod gains;
-mod least_useful;
 mod options;
 mod prices;
 mod probe;
@@ -25,9 +24,8 @@ mod testing;
 mod tests;
 
 pub use area::area_steps;
-pub use choose::{Storage, choose, choose_of_all};
+pub use choose::{choose, choose_of_all};
 pub use estimate::{Estimator, Start};
-pub use least_useful::{Weighed, least_useful};
 pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, SelectionOutcome, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, Walk};

@@ -56,7 +56,7 @@ pub enum Probe {
     Off,
 }
 
-/// Costs of the structures, and limits on the nodes that are considered. Times are per ray on one
+/// Costs of the structures, and which nodes are considered. Times are per ray on one
 /// thread.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CostOptions {
@@ -79,12 +79,6 @@ pub struct CostOptions {
     /// Min saving of all chosen nodes together, as a share of the cost of the model's BVH; below it
     /// no node is chosen, because tet leaves take several times the memory of a BVH.
     pub minimum_gain: f64,
-    /// Bytes that traversal may read for each triangle of the model, the BVH included. Sizes are
-    /// estimated before tetrahedra are built; afterwards those beyond the limit are skipped.
-    pub max_bytes_per_triangle: Option<f64>,
-    /// Seconds of one thread that tetrahedralization may take, by the profile's estimate and not by
-    /// the clock, so that the same nodes are chosen on every machine.
-    pub budget: Option<f64>,
     /// The criterion by which tetrahedra stay after they are built.
     pub probe: Probe,
     /// Rays that weight the nodes of the object: in addition to sampled ones for the BVH, instead
@@ -106,11 +100,9 @@ fn by_hash<S: Serializer>(profile: &Profile, to: S) -> Result<S::Ok, S::Error> {
 
 impl CostOptions {
     /// Returns true if the gain of the selection cannot become less where more nodes are suitable.
-    /// Without limits the selection of max gain is found exactly; limits and the paper's rule
-    /// promise nothing of the kind.
+    /// The paper's rule promises nothing of the kind.
     pub fn more_suitable_gain_more(&self) -> bool {
-        let limited = self.max_bytes_per_triangle.is_some() || self.budget.is_some();
-        !limited && matches!(self.select, Select::Best)
+        matches!(self.select, Select::Best)
     }
 }
 
@@ -125,8 +117,6 @@ impl Default for CostOptions {
             minimum_triangles: 2048,
             maximum_triangles: 1 << 20,
             minimum_gain: 0.02,
-            max_bytes_per_triangle: None,
-            budget: None,
             probe: Probe::default(),
             rays: None,
         }
@@ -149,8 +139,6 @@ pub enum SelectionOutcome {
     RefusedLarge,
     /// It would be chosen, but all such nodes together save less than the min gain.
     RefusedGain,
-    /// It would be chosen without the limits on bytes and time.
-    RefusedLimit,
     /// Some of its triangles are in bad contact.
     Unsuitable,
 }
@@ -164,7 +152,6 @@ impl std::fmt::Display for SelectionOutcome {
             SelectionOutcome::RefusedSmall => "no: too few triangles",
             SelectionOutcome::RefusedLarge => "no: too many triangles",
             SelectionOutcome::RefusedGain => "no: too little gained on the whole",
-            SelectionOutcome::RefusedLimit => "no: over the limit of bytes or time",
             SelectionOutcome::Unsuitable => "no: bad contacts",
         })
     }
@@ -206,7 +193,7 @@ pub struct Choice {
 /// Report of the selection.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CostReport {
-    /// The costs and limits that were used.
+    /// The costs that were used.
     pub options: CostOptions,
     /// Nodes examined.
     pub examined: u64,

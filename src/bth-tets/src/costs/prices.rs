@@ -1,8 +1,8 @@
-//! Costs of a tetrahedralization by its size: time of rays, bytes, and time to make them.
+//! Costs of rays through a tetrahedralization, by its size.
 
 use super::profile::BvhCosts;
 use super::{CostOptions, Start, Walk};
-use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
+use bth_format::layout::{RecordKind, TetVertex};
 
 /// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on
 /// scans.
@@ -21,9 +21,6 @@ pub(super) struct Prices<'a> {
     scale: f64,
 }
 
-/// Seconds of the unit in which profiles give times.
-const MICROSECOND: f64 = 1e-6;
-
 impl<'a> Prices<'a> {
     pub(super) fn new(options: &'a CostOptions, record: RecordKind) -> Self {
         let costs = options.profile.record(record);
@@ -34,20 +31,6 @@ impl<'a> Prices<'a> {
     /// Costs of the BVH.
     pub(super) fn bvh(&self) -> BvhCosts {
         self.options.profile.bvh
-    }
-
-    /// Bytes of the tetrahedra, vertices and faces of this many triangles.
-    pub(super) fn bytes(&self, triangles: u32) -> f64 {
-        let record = self.record.stride() as f64;
-        let a_triangle = TETS_PER_TRIANGLE * record
-            + VERTICES_PER_TRIANGLE * size_of::<TetVertex>() as f64
-            + size_of::<TetFace>() as f64;
-        f64::from(triangles) * a_triangle + (size_of::<TetLeaf>() + 12 * size_of::<HullFace>()) as f64
-    }
-
-    /// Seconds to tetrahedralize this many triangles.
-    pub(super) fn seconds(&self, triangles: u32) -> f64 {
-        f64::from(triangles) * self.options.profile.tetrahedralize * MICROSECOND
     }
 
     /// Bytes that walks read: the records and the vertices.

@@ -18,8 +18,6 @@ pub struct Profile {
     pub tets: BTreeMap<String, Walk>,
     /// Sizes in bytes of the tetrahedra that the two costs of a step were measured on.
     pub bytes: [f64; 2],
-    /// Tetrahedralization, microseconds a triangle.
-    pub tetrahedralize: f64,
 }
 
 /// Costs of the BVH.

@@ -23,14 +23,12 @@ pub(super) struct PaperCosts {
 
 /// Chooses nodes from the root down: a suitable node of fitting size becomes a tet leaf if
 /// `C_tet N_avg` (the paper's equation 2) plus the cost of entering the tetrahedra is below the
-/// cost of its BVH. Otherwise, and where its triangles alone exceed the limits, its children are
-/// examined.
+/// cost of its BVH. Otherwise its children are examined.
 pub(super) fn choose(
     bvh: &BinaryBvh,
     marks: &Marks,
     options: &CostOptions,
     prices: &Prices<'_>,
-    fits: impl Fn(u32) -> bool,
     monitor: &dyn Monitor,
 ) -> Result<(Choice, f64, f64)> {
     let paper = PaperCosts { estimator: options.estimator, visit: options.profile.bvh.outside };
@@ -56,8 +54,6 @@ pub(super) fn choose(
             SelectionOutcome::Unsuitable
         } else if node.count > options.maximum_triangles {
             SelectionOutcome::RefusedLarge
-        } else if cost_tet < cost_bvh && !fits(node.count) {
-            SelectionOutcome::RefusedLimit
         } else if cost_tet < cost_bvh {
             SelectionOutcome::Chosen
         } else {

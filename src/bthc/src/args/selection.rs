@@ -1,7 +1,6 @@
 //! Options that decide how trees are built and which nodes are tetrahedralized.
 
 use super::choices::*;
-use super::common::{SMALLER, positive};
 use crate::failure::Failure;
 use crate::ray_files;
 use bth_compile::Monitor;
@@ -17,10 +16,6 @@ pub(crate) struct Selection {
     /// Effort of the BVH builder.
     #[arg(long, value_enum, default_value_t = Quality::Balanced)]
     pub(crate) quality: Quality,
-    /// Max bytes that tracing may read per triangle of an object, including the BVH. Nodes that
-    /// save little for their bytes stay BVH. Warns if the BVH alone is larger.
-    #[arg(long, help_heading = SMALLER, value_name = "BYTES", value_parser = positive)]
-    pub(crate) max_bytes_per_triangle: Option<f64>,
     /// Rays that will be traced through the model, such as a light baker's, in a .rays file (see
     /// `bthc trace`). The tree is built so that they take fewer steps. Answers do not depend on it.
     #[arg(long, value_name = "FILE")]
@@ -41,10 +36,8 @@ impl Selection {
         monitor: &dyn Monitor,
     ) -> Result<(), Failure> {
         options.bvh.quality = self.quality.into();
-        let costs = &mut options.costs;
-        costs.max_bytes_per_triangle = self.max_bytes_per_triangle;
         if let Some(path) = &self.rays {
-            costs.rays = Some(Arc::new(known_rays(path, monitor)?));
+            options.costs.rays = Some(Arc::new(known_rays(path, monitor)?));
         }
         for setting in &self.settings {
             setting.apply(options);

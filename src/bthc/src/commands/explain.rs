@@ -20,8 +20,7 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
         let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;
         let (tree, _) = pipeline::build_tree(&mesh, &options, &progress)?;
         let (marks, _) = marks::mark(&mesh, &tree, &progress)?;
-        let storage = pipeline::storage(&mesh, &tree, &options, &progress)?;
-        let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, storage, &progress)?;
+        let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, options.record, &progress)?;
         Ok((mesh, chosen))
     })??;
     drop(progress);

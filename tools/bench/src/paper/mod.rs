@@ -175,8 +175,8 @@ fn scalar<const STORED: usize>(
         minimum_gain: 0.0,
         ..costs::CostOptions::default()
     };
-    let storage = costs::Storage { record: profile_record(STORED), plain_bytes: None };
-    let (choice, _) = costs::choose(mesh, &tree, &marks, &costs, storage, &Silent)?;
+    let record = profile_record(STORED);
+    let (choice, _) = costs::choose(mesh, &tree, &marks, &costs, record, &Silent)?;
     let (leaves, _) = tets::build(mesh, &tree, &choice.chosen, &tet_options, &Silent)?;
     let mut bth = PaperTree::<STORED>::new(mesh, &tree, &leaves);
     let seconds = bvh_seconds + clock.elapsed().as_secs_f64();

@@ -2,80 +2,63 @@
 
 use crate::builder::{UpdateC, with};
 use crate::query::attempt;
-use crate::{ERROR_ARGUMENT, OK, fail};
+use crate::{ERROR_ARGUMENT, OK, Out, fail};
 use runtime::{Error, Scene, SceneBuilder, Update};
+use std::mem::MaybeUninit;
 
 /// Number of vertices of an object; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_vertex_count(scene: *const Scene, object: u32) -> usize {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
+pub extern "C" fn bth_vertex_count(scene: Option<&Scene>, object: u32) -> usize {
+    let scene = scene.filter(|scene| object < scene.object_count());
     scene.and_then(|scene| scene.vertex_count(object)).unwrap_or(0)
 }
 
 /// Gives an object new positions; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open, and no other call uses it at the same time. `positions` is null or
-/// points to `count` positions. `update` is null or valid for writes.
+/// `positions` is null or points to `count` positions.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_set_positions(
-    scene: *mut Scene,
+    scene: Option<&mut Scene>,
     object: u32,
     positions: *const [f32; 3],
     count: usize,
-    update: *mut UpdateC,
+    update: Out<'_, UpdateC>,
 ) -> i32 {
     const NAME: &str = "bth_set_positions";
-    // SAFETY: by contract they are null or valid, and the scene is not used by another call at the
-    // same time.
-    let (Some(scene), Some(positions)) = (unsafe { scene.as_mut() }, unsafe { slice(positions, count) })
-    else {
+    // SAFETY: the contract of this function includes the contract of `slice`.
+    let (Some(scene), Some(positions)) = (scene, unsafe { slice(positions, count) }) else {
         return fail(ERROR_ARGUMENT, format!("{NAME}: scene and positions must not be null"));
     };
-    // SAFETY: the contract of this function includes the contract of `finish`.
-    unsafe { finish(NAME, update, || scene.set_positions(object, positions)) }
+    finish(NAME, update, || scene.set_positions(object, positions))
 }
 
 /// Gives an object positions between those at two times; see `bth.h`.
 ///
 /// # Safety
-/// The contract of [`bth_set_positions`]; `ends` is null or points to two pointers, each of them as
-/// `positions` there.
+/// Each of `ends` is as `positions` of [`bth_set_positions`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_set_positions_between(
-    scene: *mut Scene,
+    scene: Option<&mut Scene>,
     object: u32,
-    ends: *const [*const [f32; 3]; 2],
+    ends: Option<&[*const [f32; 3]; 2]>,
     count: usize,
     share: f64,
-    update: *mut UpdateC,
+    update: Out<'_, UpdateC>,
 ) -> i32 {
     const NAME: &str = "bth_set_positions_between";
-    // SAFETY: by contract they are null or valid, and the scene is not used by another call at the
-    // same time.
-    let (Some(scene), Some(ends)) = (unsafe { scene.as_mut() }, unsafe { both(ends, count) }) else {
+    // SAFETY: the contract of this function includes the contract of `both`.
+    let (Some(scene), Some(ends)) = (scene, unsafe { both(ends, count) }) else {
         return fail(ERROR_ARGUMENT, format!("{NAME}: scene and positions must not be null"));
     };
-    // SAFETY: the contract of this function includes the contract of `finish`.
-    unsafe { finish(NAME, update, || scene.set_positions_between(object, ends, share)) }
+    finish(NAME, update, || scene.set_positions_between(object, ends, share))
 }
 
 /// Calls a function and hands its result on to C.
-///
-/// # Safety
-/// `update` is null or valid for writes.
-unsafe fn finish(name: &str, update: *mut UpdateC, change: impl FnOnce() -> Result<Update, Error>) -> i32 {
+fn finish(name: &str, update: Out<'_, UpdateC>, change: impl FnOnce() -> Result<Update, Error>) -> i32 {
     match attempt(name, change) {
         Ok(done) => {
-            if !update.is_null() {
-                // SAFETY: it is not null, so it is valid for writes by the contract of this
-                // function.
-                unsafe { update.write(UpdateC::new(&done)) };
-            }
+            update.into_iter().for_each(|out| *out = MaybeUninit::new(UpdateC::new(&done)));
             OK
         }
         Err(code) => code,
@@ -85,11 +68,10 @@ unsafe fn finish(name: &str, update: *mut UpdateC, change: impl FnOnce() -> Resu
 /// Stages new positions of an object of a builder; see `bth.h`.
 ///
 /// # Safety
-/// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
 /// `positions` is null or points to `count` positions.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_set_positions(
-    builder: *mut SceneBuilder,
+    builder: Option<&mut SceneBuilder>,
     object: u32,
     positions: *const [f32; 3],
     count: usize,
@@ -99,20 +81,18 @@ pub unsafe extern "C" fn bth_builder_set_positions(
     let Some(positions) = (unsafe { slice(positions, count) }) else {
         return fail(ERROR_ARGUMENT, format!("{NAME}: positions must not be null"));
     };
-    // SAFETY: the contract of this function includes the contract of `with`.
-    unsafe { with(builder, NAME, |builder| builder.set_positions(object, positions)) }
+    with(builder, NAME, |builder| builder.set_positions(object, positions))
 }
 
 /// Stages positions of an object of a builder between those at two times; see `bth.h`.
 ///
 /// # Safety
-/// The contract of [`bth_builder_set_positions`]; `ends` is null or points to two pointers, each of
-/// them as `positions` there.
+/// Each of `ends` is as `positions` of [`bth_set_positions`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_set_positions_between(
-    builder: *mut SceneBuilder,
+    builder: Option<&mut SceneBuilder>,
     object: u32,
-    ends: *const [*const [f32; 3]; 2],
+    ends: Option<&[*const [f32; 3]; 2]>,
     count: usize,
     share: f64,
 ) -> i32 {
@@ -121,17 +101,15 @@ pub unsafe extern "C" fn bth_builder_set_positions_between(
     let Some(ends) = (unsafe { both(ends, count) }) else {
         return fail(ERROR_ARGUMENT, format!("{NAME}: positions must not be null"));
     };
-    // SAFETY: the contract of this function includes the contract of `with`.
-    unsafe { with(builder, NAME, |builder| builder.set_positions_between(object, ends, share)) }
+    with(builder, NAME, |builder| builder.set_positions_between(object, ends, share))
 }
 
 /// Positions at two times from C; `None` if a pointer is null.
 ///
 /// # Safety
-/// `ends` is null or points to two pointers, each as [`slice`] expects it.
-unsafe fn both<'a>(ends: *const [*const [f32; 3]; 2], count: usize) -> Option<[&'a [[f32; 3]]; 2]> {
-    // SAFETY: by contract it is null or valid for reads.
-    let [open, close] = *unsafe { ends.as_ref() }?;
+/// Each of `ends` is as [`slice`] expects it.
+unsafe fn both<'a>(ends: Option<&[*const [f32; 3]; 2]>, count: usize) -> Option<[&'a [[f32; 3]]; 2]> {
+    let [open, close] = *ends?;
     // SAFETY: the contract of this function includes the contract of `slice`.
     Some([unsafe { slice(open, count) }?, unsafe { slice(close, count) }?])
 }

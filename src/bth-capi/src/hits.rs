@@ -265,22 +265,17 @@ queries! {
 }
 
 /// The numbers of a hit; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open. `ray` and `hit` are null or valid for reads. `numbers` is null or valid
-/// for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_hit_f64(
-    scene: *const Scene,
-    ray: *const Ray64,
-    hit: *const Hit,
-    numbers: *mut Hit64,
+pub extern "C" fn bth_hit_f64(
+    scene: Option<&Scene>,
+    ray: Option<&Ray64>,
+    hit: Option<&Hit>,
+    numbers: Out<'_, Hit64>,
 ) -> i32 {
-    // SAFETY: by contract both are null, and then rejected, or valid for reads.
-    let (Some(ray), Some(hit)) = (unsafe { (ray.as_ref(), hit.as_ref()) }) else {
+    let (Some(ray), Some(hit)) = (ray, hit) else {
         return fail(ERROR_ARGUMENT, "bth_hit_f64: ray and hit must not be null".into());
     };
-    let find = |scene: &Scene| {
+    store("bth_hit_f64", scene, numbers, |scene| {
         if hit.is_hit() {
             check_triangle(scene, hit.primitive)?;
             let instance = hit.primitive.instance;
@@ -289,19 +284,13 @@ pub unsafe extern "C" fn bth_hit_f64(
             }
         }
         Ok(scene.hit_f64(ray, hit))
-    };
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { store("bth_hit_f64", scene, numbers, find) }
+    })
 }
 
 /// Sets the mask of an instance; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open, and no other call uses it at the same time.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_set_instance_mask(scene: *mut Scene, instance: u32, mask: u32) -> i32 {
-    // SAFETY: by contract it is null or open, and not used by another call at the same time.
-    let Some(scene) = (unsafe { scene.as_mut() }) else {
+pub extern "C" fn bth_set_instance_mask(scene: Option<&mut Scene>, instance: u32, mask: u32) -> i32 {
+    let Some(scene) = scene else {
         return fail(ERROR_ARGUMENT, "bth_set_instance_mask: scene must not be null".into());
     };
     let count = scene.row_count();
@@ -314,13 +303,9 @@ pub unsafe extern "C" fn bth_set_instance_mask(scene: *mut Scene, instance: u32,
 }
 
 /// Sets the mask of a group of triangles; see `bth.h`.
-///
-/// # Safety
-/// The contract of [`bth_set_instance_mask`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_set_group_mask(scene: *mut Scene, object: u32, group: u32, mask: u32) -> i32 {
-    // SAFETY: by contract it is null or open, and not used by another call at the same time.
-    let Some(scene) = (unsafe { scene.as_mut() }) else {
+pub extern "C" fn bth_set_group_mask(scene: Option<&mut Scene>, object: u32, group: u32, mask: u32) -> i32 {
+    let Some(scene) = scene else {
         return fail(ERROR_ARGUMENT, "bth_set_group_mask: scene must not be null".into());
     };
     let objects = scene.object_count();

@@ -1,5 +1,6 @@
 //! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept
-//! consistent with this crate.
+//! consistent with this crate. Pointers that are null or valid by its contract are references
+//! here; arrays are pointers.
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
 pub mod builder;
@@ -18,6 +19,7 @@ use runtime::rays::{Hit, PrimitiveRef, Ray};
 use runtime::{Code, Error, Scene};
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
+use std::mem::MaybeUninit;
 use std::panic::catch_unwind;
 use std::path::Path;
 use std::slice::{from_mut, from_ref};
@@ -40,6 +42,9 @@ thread_local! {
     /// Result of [`bth_last_error`].
     static LAST_ERROR: RefCell<CString> = RefCell::default();
 }
+
+/// Where a result is stored, unless it is null.
+type Out<'a, T> = Option<&'a mut MaybeUninit<T>>;
 
 /// Stores the text of an error for [`bth_last_error`] and returns its code.
 fn fail(code: i32, text: String) -> i32 {
@@ -99,18 +104,10 @@ pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *
     }
 }
 
-/// Closes a scene; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null, or it comes from [`bth_open`], has not been closed, and no other call uses it
-/// now or later.
+/// Closes a scene, which [`bth_open`] or a function like it opened; see `bth.h`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_close(scene: *mut Scene) {
-    if !scene.is_null() {
-        // SAFETY: `bth_open` obtained the pointer from `Box::into_raw`, and by the contract of this
-        // function it has not been freed and is not used by another call.
-        drop(unsafe { Box::from_raw(scene) });
-    }
+pub extern "C" fn bth_close(scene: Option<Box<Scene>>) {
+    drop(scene);
 }
 
 /// Text of the last error on this thread; see `bth.h`.
@@ -205,11 +202,7 @@ unsafe fn any_of_batch(arguments: Arguments<Ray, u8>) -> i32 {
 }
 
 /// Bytes of the sections that traversal reads; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_resident_bytes(scene: *const Scene) -> u64 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    unsafe { scene.as_ref() }.map_or(0, Scene::resident_bytes)
+pub extern "C" fn bth_resident_bytes(scene: Option<&Scene>) -> u64 {
+    scene.map_or(0, Scene::resident_bytes)
 }

@@ -2,7 +2,7 @@
 //! colours.
 
 use crate::surface::{check_triangle, store};
-use crate::{ERROR_ARGUMENT, ERROR_MISSING, fail};
+use crate::{ERROR_ARGUMENT, ERROR_MISSING, Out, fail};
 use runtime::rays::Hit;
 use runtime::{Alpha, Scene, Wrap};
 
@@ -85,15 +85,12 @@ fn no_row(what: &str, object: u32, row: u32, (objects, rows): (u32, u32)) -> (i3
 }
 
 /// How a material looks; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `look` is null or valid for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_material(
-    scene: *const Scene,
+pub extern "C" fn bth_material(
+    scene: Option<&Scene>,
     object: u32,
     material: u32,
-    look: *mut MaterialC,
+    look: Out<'_, MaterialC>,
 ) -> i32 {
     let find = |scene: &Scene| {
         let objects = scene.object_count();
@@ -107,30 +104,22 @@ pub unsafe extern "C" fn bth_material(
         });
         found.map(|found| MaterialC::new(&found))
     };
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { store("bth_material", scene, look, find) }
+    store("bth_material", scene, look, find)
 }
 
 /// Number of textures of an object; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_texture_count(scene: *const Scene, object: u32) -> u32 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    unsafe { scene.as_ref() }.map_or(0, |scene| scene.texture_count(object))
+pub extern "C" fn bth_texture_count(scene: Option<&Scene>, object: u32) -> u32 {
+    scene.map_or(0, |scene| scene.texture_count(object))
 }
 
 /// A texture of an object; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `image` is null or valid for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_texture(
-    scene: *const Scene,
+pub extern "C" fn bth_texture(
+    scene: Option<&Scene>,
     object: u32,
     texture: u32,
-    image: *mut TextureC,
+    image: Out<'_, TextureC>,
 ) -> i32 {
     let wrap = |wrap: Wrap| match wrap {
         Wrap::Repeat => 0,
@@ -152,24 +141,18 @@ pub unsafe extern "C" fn bth_texture(
             reserved: 0,
         })
     };
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { store("bth_texture", scene, image, find) }
+    store("bth_texture", scene, image, find)
 }
 
 /// The texture coordinates of a set at a hit; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `hit` is null or valid for reads; `uv` is null or points to two numbers
-/// that are valid for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_texture_coordinates(
-    scene: *const Scene,
-    hit: *const Hit,
+pub extern "C" fn bth_texture_coordinates(
+    scene: Option<&Scene>,
+    hit: Option<&Hit>,
     uv_set: u32,
-    uv: *mut [f32; 2],
+    uv: Out<'_, [f32; 2]>,
 ) -> i32 {
-    // SAFETY: by contract it is null or valid for reads.
-    let Some(hit) = (unsafe { hit.as_ref() }) else {
+    let Some(hit) = hit else {
         return fail(ERROR_ARGUMENT, "bth_texture_coordinates: hit must not be null".into());
     };
     let find = |scene: &Scene| {
@@ -183,19 +166,17 @@ pub unsafe extern "C" fn bth_texture_coordinates(
         let nothing = || (ERROR_MISSING, format!("the file keeps no set {uv_set} for the triangle"));
         scene.texture_coordinates(hit, uv_set).ok_or_else(nothing)
     };
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { store("bth_texture_coordinates", scene, uv, find) }
+    store("bth_texture_coordinates", scene, uv, find)
 }
 
 /// The vertex colour at a hit; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `hit` is null or valid for reads; `color` is null or points to four
-/// numbers that are valid for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_vertex_color(scene: *const Scene, hit: *const Hit, color: *mut [f32; 4]) -> i32 {
-    // SAFETY: by contract it is null or valid for reads.
-    let Some(hit) = (unsafe { hit.as_ref() }) else {
+pub extern "C" fn bth_vertex_color(
+    scene: Option<&Scene>,
+    hit: Option<&Hit>,
+    color: Out<'_, [f32; 4]>,
+) -> i32 {
+    let Some(hit) = hit else {
         return fail(ERROR_ARGUMENT, "bth_vertex_color: hit must not be null".into());
     };
     let find = |scene: &Scene| {
@@ -203,6 +184,5 @@ pub unsafe extern "C" fn bth_vertex_color(scene: *const Scene, hit: *const Hit, 
         let nothing = || (ERROR_MISSING, "the file keeps no vertex colors of the triangle".to_owned());
         scene.vertex_color(hit).ok_or_else(nothing)
     };
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { store("bth_vertex_color", scene, color, find) }
+    store("bth_vertex_color", scene, color, find)
 }

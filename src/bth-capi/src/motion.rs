@@ -1,9 +1,9 @@
 //! The part of the C interface that sets the time of scenes and returns their instances.
 
 use crate::query::attempt;
-use crate::{ERROR_ARGUMENT, OK, fail};
-
+use crate::{ERROR_ARGUMENT, OK, Out, fail};
 use runtime::{Error, Scene};
+use std::mem::MaybeUninit;
 
 /// `bth_instance` of `bth.h`.
 #[derive(Clone, Copy, Debug)]
@@ -40,93 +40,65 @@ pub unsafe extern "C" fn bth_frames(scene: *const Scene, first: *mut i32, last: 
 }
 
 /// Time of a scene; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_seconds(scene: *const Scene) -> f64 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    unsafe { scene.as_ref() }.map_or(0.0, Scene::seconds)
+pub extern "C" fn bth_seconds(scene: Option<&Scene>) -> f64 {
+    scene.map_or(0.0, Scene::seconds)
 }
 
 /// Moves a scene to a time; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open, and no other call uses it at the same time.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_set_seconds(scene: *mut Scene, seconds: f64) -> i32 {
+pub extern "C" fn bth_set_seconds(scene: Option<&mut Scene>, seconds: f64) -> i32 {
     if !seconds.is_finite() {
         return fail(ERROR_ARGUMENT, format!("bth_set_seconds: expected a finite time, found {seconds}"));
     }
-    // SAFETY: the contract of this function is the contract of `update`.
-    unsafe { update(scene, "bth_set_seconds", |scene| scene.set_seconds(seconds).map(drop)) }
+    update(scene, "bth_set_seconds", |scene| scene.set_seconds(seconds).map(drop))
 }
 
 /// Moves a scene to a frame; see `bth.h`.
-///
-/// # Safety
-/// The contract of [`bth_set_seconds`].
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_set_frame(scene: *mut Scene, frame: i32) -> i32 {
-    // SAFETY: the contract of this function is the contract of `update`.
-    unsafe { update(scene, "bth_set_frame", |scene| scene.set_frame(frame).map(drop)) }
+pub extern "C" fn bth_set_frame(scene: Option<&mut Scene>, frame: i32) -> i32 {
+    update(scene, "bth_set_frame", |scene| scene.set_frame(frame).map(drop))
 }
 
 /// Calls `set_time` with the scene. Returns its error or panic as a code. `name` is the name of the
 /// C function, for error messages.
-///
-/// # Safety
-/// The contract of [`bth_set_seconds`].
-unsafe fn update(
-    scene: *mut Scene,
+fn update(
+    scene: Option<&mut Scene>,
     name: &str,
     set_time: impl FnOnce(&mut Scene) -> Result<(), Error>,
 ) -> i32 {
-    // SAFETY: by contract it is null or open, and not used by another call at the same time.
-    let Some(scene) = (unsafe { scene.as_mut() }) else {
+    let Some(scene) = scene else {
         return fail(ERROR_ARGUMENT, format!("{name}: scene must not be null"));
     };
     attempt(name, || set_time(scene)).map_or_else(|code| code, |()| OK)
 }
 
 /// Number of instances; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_instance_count(scene: *const Scene) -> u32 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    unsafe { scene.as_ref() }.map_or(0, Scene::instance_count)
+pub extern "C" fn bth_instance_count(scene: Option<&Scene>) -> u32 {
+    scene.map_or(0, Scene::instance_count)
 }
 
 /// The way to an instance; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `rows` is null or valid for writes of 16 numbers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_instance_path(
-    scene: *const Scene,
+pub extern "C" fn bth_instance_path(
+    scene: Option<&Scene>,
     instance: u32,
-    rows: *mut [u32; MAX_PATH],
+    rows: Option<&mut [MaybeUninit<u32>; MAX_PATH]>,
 ) -> u32 {
-    // SAFETY: by contract `scene` is null or open, and `rows` is null or valid for writes.
-    let (Some(scene), Some(rows)) = (unsafe { scene.as_ref() }, unsafe { rows.as_mut() }) else { return 0 };
+    let (Some(scene), Some(rows)) = (scene, rows) else { return 0 };
     if instance >= scene.instance_count() {
         return 0;
     }
     let path = scene.instance_path(instance);
-    rows[..path.len()].copy_from_slice(&path);
+    rows.iter_mut().zip(&path).for_each(|(row, of_path)| *row = MaybeUninit::new(*of_path));
     path.len() as u32
 }
 
 /// An instance; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `instance` is null or valid for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_get_instance(scene: *const Scene, row: u32, instance: *mut Instance) -> i32 {
-    // SAFETY: by contract `scene` is null or open, and `instance` is null or valid for writes.
-    let (Some(scene), Some(out)) = (unsafe { scene.as_ref() }, unsafe { instance.as_mut() }) else {
+pub extern "C" fn bth_get_instance(scene: Option<&Scene>, row: u32, instance: Out<'_, Instance>) -> i32 {
+    let (Some(scene), Some(out)) = (scene, instance) else {
         return fail(ERROR_ARGUMENT, "bth_get_instance: scene and instance must not be null".into());
     };
     if row >= scene.instance_count() {
@@ -134,12 +106,12 @@ pub unsafe extern "C" fn bth_get_instance(scene: *const Scene, row: u32, instanc
         return fail(ERROR_ARGUMENT, format!("bth_get_instance: expected a row below {count}, found {row}"));
     }
     let view = scene.instance(row);
-    *out = Instance {
+    out.write(Instance {
         to_world: view.to_world,
         object: view.object,
         node: view.node,
         visible: view.visible.into(),
         reserved: 0,
-    };
+    });
     OK
 }

@@ -139,14 +139,9 @@ pub unsafe extern "C" fn bth_any_starts(
 }
 
 /// Checks that rays can start at a point; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open. `start` is null or valid for reads.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_check_start(scene: *const Scene, start: *const Start) -> i32 {
-    // SAFETY: by contract each is null or valid for reads. `Start` has the layout of `bth_start`,
-    // and all bit patterns are valid for it.
-    let (Some(scene), Some(start)) = (unsafe { (scene.as_ref(), start.as_ref()) }) else {
+pub extern "C" fn bth_check_start(scene: Option<&Scene>, start: Option<&Start>) -> i32 {
+    let (Some(scene), Some(start)) = (scene, start) else {
         return fail(ERROR_ARGUMENT, "bth_check_start: scene and start must not be null".into());
     };
     attempt("bth_check_start", || scene.check_start(start)).map_or_else(|code| code, |()| OK)

@@ -1,7 +1,7 @@
 //! The part of the C interface that describes what hits lead to: surfaces, triangles, bounds and
 //! names.
 
-use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, ERROR_MISSING, OK, fail};
+use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, ERROR_MISSING, OK, Out, fail};
 use runtime::Scene;
 use runtime::rays::{Hit, PrimitiveRef};
 use std::ffi::c_char;
@@ -30,26 +30,21 @@ const _: () = assert!(size_of::<SurfacePointC>() == 96);
 
 /// Calls a function with the scene and stores its result; returns a code. The function returns an
 /// error's code and text.
-///
-/// # Safety
-/// `scene` is null or open; `out` is null or valid for writes.
-pub(crate) unsafe fn store<T>(
+pub(crate) fn store<T>(
     name: &str,
-    scene: *const Scene,
-    out: *mut T,
+    scene: Option<&Scene>,
+    out: Out<'_, T>,
     find: impl FnOnce(&Scene) -> Result<T, (i32, String)>,
 ) -> i32 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    let Some(scene) = (unsafe { scene.as_ref() }) else {
+    let Some(scene) = scene else {
         return fail(ERROR_ARGUMENT, format!("{name}: scene must not be null"));
     };
-    if out.is_null() {
+    let Some(out) = out else {
         return fail(ERROR_ARGUMENT, format!("{name}: the result must not be null"));
-    }
+    };
     match catch_unwind(AssertUnwindSafe(|| find(scene))) {
         Ok(Ok(found)) => {
-            // SAFETY: it is not null, so it is valid for writes by contract.
-            unsafe { out.write(found) };
+            out.write(found);
             OK
         }
         Ok(Err((code, text))) => fail(code, format!("{name}: {text}")),
@@ -93,97 +88,70 @@ pub extern "C" fn bth_version() -> *const c_char {
 }
 
 /// World box of a scene; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `bounds` is null or points to six numbers that are valid for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_bounds(scene: *const Scene, bounds: *mut [[f32; 3]; 2]) -> i32 {
+pub extern "C" fn bth_bounds(scene: Option<&Scene>, bounds: Out<'_, [[f32; 3]; 2]>) -> i32 {
     let nothing = || (ERROR_MISSING, "nothing is visible".to_owned());
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { store("bth_bounds", scene, bounds, |scene| scene.bounds().map(Into::into).ok_or_else(nothing)) }
+    store("bth_bounds", scene, bounds, |scene| scene.bounds().map(Into::into).ok_or_else(nothing))
 }
 
 /// Number of objects; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_object_count(scene: *const Scene) -> u32 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    unsafe { scene.as_ref() }.map_or(0, Scene::object_count)
+pub extern "C" fn bth_object_count(scene: Option<&Scene>) -> u32 {
+    scene.map_or(0, Scene::object_count)
+}
+
+/// The scene, if it has an object of this number.
+fn with_object(scene: Option<&Scene>, object: u32) -> Option<&Scene> {
+    scene.filter(|scene| object < scene.object_count())
 }
 
 /// Number of groups of an object; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_group_count(scene: *const Scene, object: u32) -> u32 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
-    scene.map_or(0, |scene| scene.group_count(object))
+pub extern "C" fn bth_group_count(scene: Option<&Scene>, object: u32) -> u32 {
+    with_object(scene, object).map_or(0, |scene| scene.group_count(object))
 }
 
 /// Number of materials of an object; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_material_count(scene: *const Scene, object: u32) -> u32 {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
-    scene.map_or(0, |scene| scene.material_count(object))
+pub extern "C" fn bth_material_count(scene: Option<&Scene>, object: u32) -> u32 {
+    with_object(scene, object).map_or(0, |scene| scene.material_count(object))
 }
 
 /// Vertices of a triangle in world space; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `positions` is null or points to nine numbers that are valid for
-/// writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_triangle_positions(
-    scene: *const Scene,
+pub extern "C" fn bth_triangle_positions(
+    scene: Option<&Scene>,
     triangle: PrimitiveRef,
-    positions: *mut [[f64; 3]; 3],
+    positions: Out<'_, [[f64; 3]; 3]>,
 ) -> i32 {
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe {
-        store("bth_triangle_positions", scene, positions, |scene| {
-            scene.triangle_in_world(triangle).ok_or_else(|| no_triangle(scene, triangle))
-        })
-    }
+    store("bth_triangle_positions", scene, positions, |scene| {
+        scene.triangle_in_world(triangle).ok_or_else(|| no_triangle(scene, triangle))
+    })
 }
 
 /// The surface at a hit; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open; `hit` is null or valid for reads; `point` is null or valid for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_surface_at(
-    scene: *const Scene,
-    hit: *const Hit,
-    point: *mut SurfacePointC,
+pub extern "C" fn bth_surface_at(
+    scene: Option<&Scene>,
+    hit: Option<&Hit>,
+    point: Out<'_, SurfacePointC>,
 ) -> i32 {
-    // SAFETY: by contract it is null or valid for reads.
-    let Some(hit) = (unsafe { hit.as_ref() }) else {
+    let Some(hit) = hit else {
         return fail(ERROR_ARGUMENT, "bth_surface_at: hit must not be null".into());
     };
-    // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe {
-        store("bth_surface_at", scene, point, |scene| {
-            let found = scene.surface(hit).ok_or_else(|| no_triangle(scene, hit.primitive))?;
-            Ok(SurfacePointC {
-                position: found.position,
-                geometric_normal: found.geometric_normal,
-                normal: found.normal,
-                uv: found.uv.unwrap_or_default(),
-                object: found.object,
-                group: found.group,
-                material: found.material.unwrap_or(u32::MAX),
-                flags: if found.uv.is_some() { HAS_UV } else { 0 },
-            })
+    store("bth_surface_at", scene, point, |scene| {
+        let found = scene.surface(hit).ok_or_else(|| no_triangle(scene, hit.primitive))?;
+        Ok(SurfacePointC {
+            position: found.position,
+            geometric_normal: found.geometric_normal,
+            normal: found.normal,
+            uv: found.uv.unwrap_or_default(),
+            object: found.object,
+            group: found.group,
+            material: found.material.unwrap_or(u32::MAX),
+            flags: if found.uv.is_some() { HAS_UV } else { 0 },
         })
-    }
+    })
 }
 
 /// Copies a name with a zero behind it to a buffer, as much of it as fits; returns its length in
@@ -208,18 +176,16 @@ unsafe fn copy_name(name: Option<&str>, buffer: *mut c_char, capacity: usize) ->
 /// Name of an object; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open; `name` is null or points to `capacity` bytes that are valid for writes.
+/// `name` is null or points to `capacity` bytes that are valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_object_name(
-    scene: *const Scene,
+    scene: Option<&Scene>,
     object: u32,
     name: *mut c_char,
     capacity: usize,
 ) -> usize {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    let found = unsafe { scene.as_ref() }.map(|scene| scene.object_name(object));
-    // SAFETY: the contract of this function includes the contract of `copy_name`.
-    unsafe { copy_name(found, name, capacity) }
+    // SAFETY: the contract is the same.
+    unsafe { copy_name(scene.map(|scene| scene.object_name(object)), name, capacity) }
 }
 
 /// Name of a group; see `bth.h`.
@@ -228,16 +194,15 @@ pub unsafe extern "C" fn bth_object_name(
 /// The contract of [`bth_object_name`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_group_name(
-    scene: *const Scene,
+    scene: Option<&Scene>,
     object: u32,
     group: u32,
     name: *mut c_char,
     capacity: usize,
 ) -> usize {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
-    // SAFETY: the contract of this function includes the contract of `copy_name`.
-    unsafe { copy_name(scene.map(|scene| scene.group_name(object, group)), name, capacity) }
+    let found = with_object(scene, object).map(|scene| scene.group_name(object, group));
+    // SAFETY: the contract is the same.
+    unsafe { copy_name(found, name, capacity) }
 }
 
 /// Name of a material; see `bth.h`.
@@ -246,14 +211,13 @@ pub unsafe extern "C" fn bth_group_name(
 /// The contract of [`bth_object_name`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_material_name(
-    scene: *const Scene,
+    scene: Option<&Scene>,
     object: u32,
     material: u32,
     name: *mut c_char,
     capacity: usize,
 ) -> usize {
-    // SAFETY: by contract it is null or open, hence valid for reads.
-    let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
-    // SAFETY: the contract of this function includes the contract of `copy_name`.
-    unsafe { copy_name(scene.map(|scene| scene.material_name(object, material)), name, capacity) }
+    let found = with_object(scene, object).map(|scene| scene.material_name(object, material));
+    // SAFETY: the contract is the same.
+    unsafe { copy_name(found, name, capacity) }
 }

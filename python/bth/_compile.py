@@ -20,7 +20,7 @@ _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "str
 
 def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, polygons=None, positions=None,
-    attributes=None, alpha=None, compact=None, geometry=None, names=None, materials=None,
+    attributes=None, alpha=None, geometry=None, names=None, materials=None,
     lenient_materials=None,
     rays=None, settings=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
     strict=None, deformable=None, free_directions=None, cache=None,

@@ -5,7 +5,7 @@ use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::sampling::KnownRays;
 use bth_compile::settings::Setting;
 use bth_compile::{bvh, coordinates, free};
-use bth_format::layout::{GridBits, RecordKind};
+use bth_format::layout::GridBits;
 use bth_import::{AlphaMode, Keep, Polygons, Positions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -67,7 +67,6 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
     let structure = keywords
         .choice("structure", &[("bth", Structure::Bth), ("bvh", Structure::Bvh), ("tets", Structure::Tets)])?
         .unwrap_or(Structure::Bvh);
-    let compact = keywords.value::<bool>("compact")?.unwrap_or(false);
     let materials = keywords.value::<bool>("materials")?.unwrap_or(false);
     let deformable = keywords.value::<bool>("deformable")?.unwrap_or(false);
     let attributes = keywords
@@ -76,7 +75,6 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
     let mut options = CompileOptions {
         structure,
         attributes: if materials { Keep::All } else { attributes },
-        record: if compact { RecordKind::Tet16 } else { RecordKind::Link32 },
         coordinates: coordinates(keywords)?,
         alpha: keywords
             .choice(

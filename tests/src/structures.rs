@@ -1,10 +1,9 @@
-//! A model compiled into every structure and record.
+//! A model compiled into every structure.
 
 use bth::Scene;
 use bth_compile::Silent;
 use bth_compile::free::KeepFree;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
-use bth_format::layout::RecordKind;
 use bth_scenes::Model;
 
 /// Name of what [`deformed`] makes.
@@ -13,15 +12,15 @@ pub const DEFORMED: &str = "deformed bvh";
 /// A structure compiled from a model.
 #[derive(Debug)]
 pub struct Traced {
-    /// Structure and record.
+    /// Structure.
     pub name: String,
     /// Ready to trace.
     pub scene: Scene,
 }
 
 /// CompileOptions with which even small models get tet leaves wherever these are possible.
-pub fn options(structure: Structure, record: RecordKind) -> CompileOptions {
-    let mut options = CompileOptions { structure, record, ..CompileOptions::default() };
+pub fn options(structure: Structure) -> CompileOptions {
+    let mut options = CompileOptions { structure, ..CompileOptions::default() };
     options.costs.minimum_triangles = 32;
     options.costs.c_tet = Some(1e-3);
     options.tets.worker = crate::worker().map(Into::into);
@@ -49,7 +48,7 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
 
 /// Those of [`every_structure`] whose names are wanted; no others are compiled.
 pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> bool) -> Vec<Traced> {
-    let bvh = options(Structure::Bvh, RecordKind::Link32);
+    let bvh = options(Structure::Bvh);
     let mut free = bvh.clone();
     free.free.keep = KeepFree::All;
     let mut distances = bvh.clone();
@@ -60,11 +59,9 @@ pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> 
         ("bvh with free distances".to_string(), distances),
     ];
     if crate::worker().is_some() {
-        for record in RecordKind::ALL {
-            wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record)));
-            if whole {
-                wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record)));
-            }
+        wanted.push(("bth".to_owned(), options(Structure::Bth)));
+        if whole {
+            wanted.push(("tets".to_owned(), options(Structure::Tets)));
         }
     }
     let wanted = wanted.into_iter().filter(|(name, _)| is_wanted(name));
@@ -92,7 +89,7 @@ pub fn deformed(model: &Model, seed: u64) -> Traced {
     };
     let shape =
         Model { positions: model.positions.iter().map(other).collect(), triangles: model.triangles.clone() };
-    let options = CompileOptions { deformable: true, ..options(Structure::Bvh, RecordKind::Link32) };
+    let options = CompileOptions { deformable: true, ..options(Structure::Bvh) };
     let mut scene = compiled(&shape, &options);
     scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
     Traced { name: DEFORMED.into(), scene }

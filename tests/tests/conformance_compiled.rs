@@ -5,7 +5,6 @@
 use bth_compile::Silent;
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
-use bth_format::layout::RecordKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -26,17 +25,12 @@ fn compiled(model: &bth_scenes::Model, options: &CompileOptions) -> Option<Vec<u
 fn kinds() -> impl Iterator<Item = CompileOptions> {
     let structures = [Structure::Bvh, Structure::Bth, Structure::Tets];
     structures.into_iter().flat_map(|structure| {
-        // Without tetrahedra their record makes no difference.
-        let records = if structure == Structure::Bvh { &RecordKind::ALL[..1] } else { &RecordKind::ALL[..] };
-        records.iter().flat_map(move |&record| {
-            [KeepFree::None, KeepFree::All].map(|keep| CompileOptions {
-                structure,
-                record,
-                // At this cost of a step the tetrahedra of the knot are chosen.
-                free: FreeOptions { keep, ..FreeOptions::default() },
-                costs: bth_compile::costs::CostOptions { c_tet: Some(1e-3), ..Default::default() },
-                ..CompileOptions::default()
-            })
+        [KeepFree::None, KeepFree::All].map(|keep| CompileOptions {
+            structure,
+            // At this cost of a step the tetrahedra of the knot are chosen.
+            free: FreeOptions { keep, ..FreeOptions::default() },
+            costs: bth_compile::costs::CostOptions { c_tet: Some(1e-3), ..Default::default() },
+            ..CompileOptions::default()
         })
     })
 }

@@ -92,7 +92,6 @@ fn byte_tables_are_those_of_the_structures() {
         HullFace { vertex tet opposite }
         Link32 { link }
         Link { next opposite }
-        Tet16 { xor next }
         Scene { rate first_frame last_frame camera reserved }
         Node { transform parent flags name name_length reserved }
         Instance { node object flags reserved }

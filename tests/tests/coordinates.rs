@@ -11,7 +11,7 @@ use bth_compile::coordinates::CoordinateOptions;
 use bth_compile::pipeline::{Structure, compile};
 use bth_compile::{Silent, pipeline};
 use bth_format::File;
-use bth_format::layout::{GridBits, RecordKind};
+use bth_format::layout::GridBits;
 use bth_import::{self, Keep, Mesh};
 use bth_scenes::{Model, blob, knot, soup};
 use bth_tests::oracle;
@@ -27,7 +27,7 @@ fn compiled(path: &Path, grid: Option<GridBits>, mut options: pipeline::CompileO
 }
 
 fn plain() -> pipeline::CompileOptions {
-    bth_tests::structures::options(Structure::Bvh, RecordKind::Link32)
+    bth_tests::structures::options(Structure::Bvh)
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
@@ -93,7 +93,7 @@ fn answers_on_a_grid_are_exact_for_the_stored_triangles_in_every_structure() {
         for grid in GridBits::ALL {
             let mut structures = vec![plain()];
             if bth_tests::worker().is_some() {
-                let with = |s| bth_tests::structures::options(s, RecordKind::Link32);
+                let with = |s| bth_tests::structures::options(s);
                 structures.push(with(Structure::Bth));
                 structures.extend(whole.then(|| with(Structure::Tets)));
             }

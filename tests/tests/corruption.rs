@@ -1,7 +1,6 @@
 //! However a file is corrupted, opening and checking it ends in a result, never in a panic.
 
 use bth::rays::Ray;
-use bth_format::layout::RecordKind;
 use bth_tests::conformance::{Editor, Seal, valid, worst};
 use std::time::{Duration, Instant};
 
@@ -111,8 +110,7 @@ fn the_worst_files_are_visited_once() {
     let size = 4_000;
     for (name, ray, bytes) in [
         ("a bundle of triangles", down, worst::bundle(size)),
-        ("a strip of link32", along, worst::strip(RecordKind::Link32, size)),
-        ("a strip of tet16", along, worst::strip(RecordKind::Tet16, size)),
+        ("a strip of tetrahedra", along, worst::strip(size)),
     ] {
         let scene = bth::from_bytes(&bytes).expect("it passes the checks");
         let (_, steps) = scene.nearest_counted(&ray);

@@ -3,7 +3,6 @@
 use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
 use bth::{Accept, Steps};
 use bth_compile::pipeline::Structure;
-use bth_format::layout::RecordKind;
 use bth_scenes::{Model, blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot, soup::soup};
 use bth_tests::oracle;
 use bth_tests::rays::{alone, assorted, check_batch, onward, starts};
@@ -149,7 +148,7 @@ fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
     for width in [1e3, 1e5, 1e7] {
         let model = knot_on_a_plain(width);
         let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-        let scene = compiled(&model, &options(Structure::Bvh, RecordKind::Link32));
+        let scene = compiled(&model, &options(Structure::Bvh));
         for along_one_direction in [false, true] {
             // Rays to the corners of each triangle and next to them, triangle by triangle.
             let targets = corners.iter().take(200).flatten().flat_map(|p| {
@@ -276,7 +275,7 @@ fn tets_are_really_walked_also_from_starts() {
     }
     let model = gyroid(3000);
     let traced = every_structure(&model, true);
-    let tets = &traced.iter().find(|t| t.name == "tets link32").expect("compiled above").scene;
+    let tets = &traced.iter().find(|t| t.name == "tets").expect("compiled above").scene;
     let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let first = assorted(&corners, 4000, 9);
     let mut hits = vec![Hit::MISS; first.len()];

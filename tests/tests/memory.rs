@@ -33,7 +33,7 @@ fn all_options() -> Vec<(&'static str, CompileOptions)> {
     fast.bvh.quality = bth_compile::bvh::Quality::Fast;
     let bits = CoordinateOptions { bits: Some(GridBits::B16), ..CoordinateOptions::default() };
     let grid = CompileOptions { coordinates: bits, geometry: false, ..bvh.clone() };
-    let tets = bth_tests::structures::options(Structure::Bth, bth_format::layout::RecordKind::Link32);
+    let tets = bth_tests::structures::options(Structure::Bth);
     let mut all = vec![("bvh", bvh), ("fast", fast), ("grid", grid), ("default", CompileOptions::default())];
     if bth_tests::worker().is_some() {
         all.push(("tets", tets));

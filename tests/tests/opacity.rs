@@ -5,7 +5,6 @@ use bth::rays::{Hit, Ray, StartRay};
 use bth::{Accept, Isa, Opacity, Scene, TraceRay};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
-use bth_format::layout::RecordKind;
 use bth_import::AlphaMode;
 use bth_import::gltf::scene::{ImportOptions, import};
 use bth_random::Rng;
@@ -59,7 +58,7 @@ fn flat(alpha: AlphaMode, options: CompileOptions) -> Scene {
 fn placed(alpha: AlphaMode) -> Scene {
     with_model(|path| {
         let (manifest, _) = import(path, "leaves.glb", &ImportOptions::default(), &Silent).unwrap();
-        let options = CompileOptions { alpha, ..options(Structure::Bvh, RecordKind::Link32) };
+        let options = CompileOptions { alpha, ..options(Structure::Bvh) };
         let (compiled, _) =
             bth_compile::scene::compile(&manifest, path.parent().unwrap(), path, &options, &Silent).unwrap();
         bth::from_bytes(&compiled.bytes).unwrap()
@@ -184,11 +183,11 @@ fn compare<R: TraceRay + Debug>(opaque: &Scene, scene: &Scene, rays: &[R], flat:
 #[test]
 fn rays_pass_through_the_holes_of_leaves_in_every_structure_and_on_every_instruction_set() {
     let _turn = turn();
-    let bvh = options(Structure::Bvh, RecordKind::Link32);
+    let bvh = options(Structure::Bvh);
     let opaque = flat(AlphaMode::None, bvh.clone());
     let mut all = vec![("bvh", bvh)];
     if bth_tests::worker().is_some() {
-        all.push(("tets", options(Structure::Bth, RecordKind::Tet16)));
+        all.push(("tets", options(Structure::Bth)));
     }
     let rays = rays(1500);
     for (name, options) in all {
@@ -218,7 +217,7 @@ fn rays_pass_through_the_holes_of_instances() {
 #[test]
 fn the_exact_oracle_sees_the_same_holes() {
     let _turn = turn();
-    let scene = flat(AlphaMode::Mask, options(Structure::Bvh, RecordKind::Link32));
+    let scene = flat(AlphaMode::Mask, options(Structure::Bvh));
     let world = bth_oracle::World::new(&scene);
     for ray in rays(150) {
         let (truth, hit) = (world.hit(ray), scene.nearest(&ray).unwrap_or(Hit::MISS));
@@ -234,7 +233,7 @@ fn the_exact_oracle_sees_the_same_holes() {
 #[test]
 fn crossings_look_at_no_opacity() {
     let _turn = turn();
-    let bvh = options(Structure::Bvh, RecordKind::Link32);
+    let bvh = options(Structure::Bvh);
     let (opaque, scene) = (flat(AlphaMode::None, bvh.clone()), flat(AlphaMode::Mask, bvh));
     for ray in rays(300) {
         assert_eq!(format!("{:?}", opaque.crossings(&ray)), format!("{:?}", scene.crossings(&ray)));
@@ -243,7 +242,7 @@ fn crossings_look_at_no_opacity() {
 
 #[test]
 fn without_the_option_files_are_what_they_were() {
-    let scene = flat(AlphaMode::None, options(Structure::Bvh, RecordKind::Link32));
+    let scene = flat(AlphaMode::None, options(Structure::Bvh));
     assert!(scene.object(0).opacity.is_empty());
     assert!(!scene.file().provenance().unwrap().contains("alpha"));
 }

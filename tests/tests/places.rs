@@ -4,7 +4,7 @@ use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::File;
 use bth_format::file::DeformableObject;
-use bth_format::layout::{Child, GridBits, NONE, RecordKind, TrianglePlace};
+use bth_format::layout::{Child, GridBits, NONE, TrianglePlace};
 use bth_format::object::ObjectView;
 use bth_scenes::{Model, blob, knot, soup};
 use bth_tests::structures::options;
@@ -19,7 +19,7 @@ fn compiled(model: &Model, options: &CompileOptions) -> File {
 
 /// Options for one kind of leaves each, with a name.
 fn kinds() -> Vec<(&'static str, CompileOptions)> {
-    let plain = options(Structure::Bvh, RecordKind::Link32);
+    let plain = options(Structure::Bvh);
     let with = |change: fn(&mut CompileOptions)| {
         let mut options = plain.clone();
         change(&mut options);
@@ -33,7 +33,7 @@ fn kinds() -> Vec<(&'static str, CompileOptions)> {
         ("free directions", with(|o| o.free.keep = bth_compile::free::KeepFree::All)),
     ];
     if bth_tests::worker().is_some() {
-        kinds.push(("tet leaves", options(Structure::Bth, RecordKind::Link32)));
+        kinds.push(("tet leaves", options(Structure::Bth)));
     }
     kinds
 }

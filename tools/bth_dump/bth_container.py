@@ -32,7 +32,7 @@ KINDS = {
     LINES: ("LINES", (64,), 1 << 29),
     TRIANGLE_IDS: ("TRIANGLE_IDS", (4,), 1 << 30),
     TET_LEAVES: ("TET_LEAVES", (64,), 1 << 29),
-    TETS: ("TETS", (32, 16), 1 << 30),
+    TETS: ("TETS", (32,), 1 << 30),
     TET_VERTICES: ("TET_VERTICES", (16,), (1 << 31) - 1),
     TET_FACES: ("TET_FACES", (32,), (1 << 31) - 1),
     HULL_FACES: ("HULL_FACES", (20,), (1 << 31) - 1),
@@ -166,8 +166,8 @@ class Container:
             need(e.kind != FORMER_SEGMENTS, "F007", "trees for ranges of time of older files", at, name)
             if e.kind in KINDS:
                 _, strides, most = KINDS[e.kind]
-                old = e.kind == TETS and e.stride == 20
-                need(not old, "F007", "tetrahedra of 20 bytes", at, name)
+                old = e.kind == TETS and e.stride in (16, 20)
+                need(not old, "F007", f"tetrahedra of {e.stride} bytes", at, name)
                 need(e.stride in strides, "F014", f"stride {e.stride}", at, name)
                 need(most is None or e.count <= most, "F022", f"{e.count} elements", at, name)
             else:

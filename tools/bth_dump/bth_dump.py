@@ -34,7 +34,6 @@ def describe(container):
                 "name": names[i] if names else "",
                 "lower": view.lower,
                 "upper": view.upper,
-                "record": view.record,
                 "triangles": view.triangles,
                 "dropped": view.dropped,
                 "depth": view.depth,
@@ -122,7 +121,7 @@ def show(description):
         print(f"object {i}: {o['triangles']} triangles ({o['dropped']} dropped), depth {o['depth']}")
         print(f"  bounds {o['lower']} to {o['upper']}")
         if o["tet_leaves"]:
-            print(f"  {o['tet_leaves']} tet leaves with {o['tets']} tetrahedra ({o['record']})")
+            print(f"  {o['tet_leaves']} tet leaves with {o['tets']} tetrahedra")
         if o["frames"]:
             print(f"  {o['frames']} frames of its vertices")
         if o["groups"]:

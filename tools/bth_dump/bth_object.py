@@ -7,9 +7,9 @@ from collections import namedtuple
 import bth_container as c
 from bth_container import Invalid, kind_name
 
-RECORDS = {1: ("Link32", 32), 4: ("Tet16", 16)}
-# Records of older files, of 32 and 20 bytes.
-OLD_RECORDS = (2, 3)
+LINK32 = 1
+# Records of older files, of 32, 20 and 16 bytes.
+OLD_RECORDS = (2, 3, 4)
 
 TetLeaf = namedtuple(
     "TetLeaf", "lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags"
@@ -80,19 +80,17 @@ class ObjectView:
         return grid
 
     def _read_tets(self):
-        """F101: the rows of TETS, in the structure that the object names."""
+        """F101: the rows of TETS, as the object says."""
         entry = self.container.by_key.get((self.index, c.TETS))
-        stride = entry.stride if entry else 0
-        self.record, expected = RECORDS.get(self.record_code, (None, None))
         if self.record_code == 0:
             good = (entry is None or entry.count == 0) and not self.tet_leaves
         else:
-            good = expected is not None and stride == expected
+            good = self.record_code == LINK32 and entry is not None
         if not good:
             number = "F007" if self.record_code in OLD_RECORDS else "F101"
-            raise self.invalid(number, f"record {self.record_code} with a TETS stride of {stride}", c.OBJECT, 28)
-        self.stride = stride
-        self.tets = [] if not self.record else self.rows(c.TETS, f"<{stride // 4}I")
+            raise self.invalid(number, f"record {self.record_code} with {len(self.tet_leaves)} tet leaves", c.OBJECT, 28)
+        self.stride = 32
+        self.tets = self.rows(c.TETS, "<8I")
 
     def bytes(self, kind):
         return self.container.section(self.index, kind)

@@ -23,14 +23,8 @@ def derive(view, leaf):
             raise bad("F125", f"hull face {hull}", row, c.HULL_FACES, 20)
         return four
 
-    def links_of(tet, four, fourth, entry):
-        """Links, given what lies behind the face opposite to `fourth`."""
-        record = view.tets[tet]
-        if view.record == "Link32":
-            return record[0::2]
-        slot = four.index(fourth)
-        last = entry if slot == 3 else record[1 + slot] ^ entry
-        return (*(n ^ last for n in record[1:]), last)
+    def links_of(tet):
+        return view.tets[tet][0::2]
 
     def beyond(tet, slot):
         """Row, fourth vertex and way back of the tetrahedron beyond a slot's face; None outside."""
@@ -54,10 +48,7 @@ def derive(view, leaf):
             if link not in tets or link == tet:
                 raise bad("F127", f"tetrahedron {link} behind {tet}", tet)
             other, back = link, tet
-            if view.record == "Link32":
-                fourth = view.tets[tet][2 * slot + 1]
-            else:
-                fourth = view.tets[other][0] ^ face[0] ^ face[1] ^ face[2]
+            fourth = view.tets[tet][2 * slot + 1]
         if fourth not in vertices or fourth in face:
             raise bad("F128", f"vertex {fourth} beyond tetrahedron {tet}", tet)
         return other, fourth, back, tuple(sorted((*face, fourth)))
@@ -66,7 +57,7 @@ def derive(view, leaf):
     found = {}
     start = view.hull_faces[hulls[0]]
     four = hull_vertices(hulls[0])
-    found[start.tet] = four, links_of(start.tet, four, start.opposite, NONE)
+    found[start.tet] = four, links_of(start.tet)
     queue = [start.tet]
     while queue:
         tet = queue.pop()
@@ -74,9 +65,9 @@ def derive(view, leaf):
             step = beyond(tet, slot)
             if step is None:
                 continue
-            other, fourth, back, four = step
+            other, _, _, four = step
             if other not in found:
-                found[other] = four, links_of(other, four, fourth, back)
+                found[other] = four, links_of(other)
                 queue.append(other)
             elif found[other][0] != four:
                 raise bad("F128", f"{four} beyond tetrahedron {tet}, but {found[other][0]}", tet)
@@ -94,11 +85,8 @@ def derive(view, leaf):
                 other, fourth, back, _ = step
                 if found[other][1][found[other][0].index(fourth)] != back:
                     raise bad("F128", f"tetrahedron {other} does not refer to {tet}", other)
-            if view.record == "Link32" and view.tets[tet][2 * slot + 1] != (NONE if step is None else step[1]):
+            if view.tets[tet][2 * slot + 1] != (NONE if step is None else step[1]):
                 raise bad("F129", f"opposite vertex of slot {slot}", tet)
-        record, xor = view.tets[tet], four[0] ^ four[1] ^ four[2] ^ four[3]
-        if view.record == "Tet16" and record[0] != xor:
-            raise bad("F129", f"record {record} of {four}", tet)
     return found
 
 

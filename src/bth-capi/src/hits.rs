@@ -3,7 +3,7 @@
 
 use crate::query::{Arguments, CHUNK, queries};
 use crate::surface::{check_triangle, store};
-use crate::{ERROR_ARGUMENT, OK, fail};
+use crate::{ERROR_ARGUMENT, OK, Out, fail};
 use runtime::rays::{Hit, Hit64, Ray, Ray64};
 use runtime::{Accept, Crossings, Cull, Filter, Scene, TraceRay};
 use std::ffi::c_void;

@@ -91,7 +91,7 @@ pub extern "C" fn bth_instance_path(
         return 0;
     }
     let path = scene.instance_path(instance);
-    rows.iter_mut().zip(&path).for_each(|(row, of_path)| *row = MaybeUninit::new(*of_path));
+    rows.iter_mut().zip(&path[..]).for_each(|(row, of_path)| *row = MaybeUninit::new(*of_path));
     path.len() as u32
 }
 

@@ -1,7 +1,6 @@
 //! The options of a compilation: the options of all stages.
 
 use crate::{bvh, coordinates, costs, free, tets};
-use bth_format::layout::RecordKind;
 use bth_import as mesh;
 use serde::Serialize;
 
@@ -52,8 +51,6 @@ pub struct CompileOptions {
     pub costs: costs::CostOptions,
     /// Tetrahedralization.
     pub tets: tets::TetOptions,
-    /// Record that stores a tetrahedron.
-    pub record: RecordKind,
     /// True to store the positions and triangles of the source.
     pub geometry: bool,
     /// True to keep what new positions at run time need (`bth::Scene::set_positions`). All vertices
@@ -84,7 +81,6 @@ impl Default for CompileOptions {
             free: free::FreeOptions::default(),
             costs: costs::CostOptions::default(),
             tets: tets::TetOptions::default(),
-            record: RecordKind::Link32,
             geometry: true,
             deformable: false,
             motion: MotionOptions::default(),

@@ -2,7 +2,6 @@
 
 use crate::costs::{Estimator, OptimizeFor, Probe, Select};
 use crate::pipeline::CompileOptions;
-use bth_format::layout::RecordKind;
 use std::fmt::Write;
 use std::time::Duration;
 
@@ -18,7 +17,7 @@ struct Key {
     apply: fn(&str, &mut CompileOptions) -> Result<(), String>,
 }
 
-const KEYS: [Key; 11] = [
+const KEYS: [Key; 10] = [
     Key {
         name: "c-tet",
         values: "NANOSECONDS",
@@ -71,15 +70,6 @@ const KEYS: [Key; 11] = [
         about: "drop tetrahedra that save no time for sampled rays, or keep them all",
         apply: |text, options| {
             set(&mut options.costs.probe, one_of(text, &[("steps", Probe::Steps), ("off", Probe::Off)]))
-        },
-    },
-    Key {
-        name: "record",
-        values: "link32|tet16",
-        about: "record of a tetrahedron: 32 bytes and fast, or 16",
-        apply: |text, options| {
-            let values = [("link32", RecordKind::Link32), ("tet16", RecordKind::Tet16)];
-            set(&mut options.record, one_of(text, &values))
         },
     },
     Key {

@@ -14,7 +14,7 @@ use std::path::Path;
 /// stage was changed on purpose, raise the stage's version and note what the test prints.
 const NOTED: &str = "\
 bvh 3 85ced845a2e06b3c60ec6905522a8ae3914e4cb9826bc17089f4ec97abdefd04
-file 5.65536 815e4e230c0a1ceb4558a26b481d9c0e987859feb8646a11265170b8e1c1fd92
+file 6.65536 18c68f638b7448a907bde9e3c95763e63c1dba81c8b116f32bda066ade448005
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
 mesh 10 f9a832bfbe932ba0eec21e4aeddd484d9703aa6ac684d191644612e7ba299c39
 ";

@@ -55,7 +55,7 @@ codes! {
     SectionHash "F021" "A section's hash is that of its bytes."
     Limit "F022" "Triangles and tetrahedra of an object number at most 2^30, lines at most 2^29."
 
-    Record "F101" "The record is of a known kind that has the stride of the TETS section, or 0 with neither tetrahedra nor tet leaves."
+    Record "F101" "The record is 1 where there is a TETS section, or 0 with neither tetrahedra nor tet leaves."
     Counts "F102" "TRIANGLE_FACES, TRIANGLE_PLACES, TRIANGLES and CORNERS are empty or have as many rows as the object has triangles; no more triangles are dropped than there are."
     ObjectBounds "F103" "Object bounds are finite with lower <= upper; without a root they are zero."
     Coordinates "F104" "Coordinates of triangle leaves are f32, with zeros in the fields of the grid, or have 16 or 21 bits on a grid whose points are all f32, with a displacement that is finite and not negative; the header's features announce the grids and widened boxes of objects."
@@ -82,7 +82,7 @@ codes! {
     TetFace "F126" "A constrained face names three distinct vertices of its leaf and the tetrahedron and fourth vertex on either side; both refer to it, and no other tetrahedron does."
     Link "F127" "A link is NONE, another tetrahedron of the same leaf or a constrained face of the same leaf."
     Neighbour "F128" "Neighbours share three vertices and refer to each other."
-    TetRecord "F129" "Vertices and exclusive ors of a record are those of its tetrahedron; opposite vertices of Link32 are those of the neighbours."
+    TetRecord "F129" "Opposite vertices of links are those of the neighbours."
     Unreached "F130" "Every tetrahedron of a leaf is reached from its first hull face."
     TriangleFaces "F131" "TRIANGLE_FACES is empty without tet leaves; else it maps each triangle that is a constrained face to that face, and others to NONE."
     SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows where the object has both."

@@ -14,6 +14,5 @@ pub mod tetrahedralize;
 
 pub use tetrahedralize::{
     Behind, Encoded, Face, Leaf, NodeInput, NodeJob, NodeReport, NodeResult, NodeRunner, Outcome, TetMesh,
-    TetOptions, TetReport, TimedNodes, WorkerStatus, build, build_through, encode, encoded_bytes, version,
-    worker,
+    TetOptions, TetReport, TimedNodes, WorkerStatus, build, build_through, encode, version, worker,
 };

@@ -11,7 +11,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 30] = files![
+const VALID: [(&str, &[u8]); 29] = files![
     "deformable",
     "deformers",
     "free-directions",
@@ -31,7 +31,6 @@ const VALID: [(&str, &[u8]); 30] = files![
     "second-uvs",
     "sequence",
     "tets-link32",
-    "tets-tet16",
     "triangle",
     "triangle-bare",
     "two-levels",

@@ -142,7 +142,7 @@ pub(super) fn invalid() -> Vec<Case> {
     };
     let child = offset_of!(WideNode, child);
     vec![
-        Case::new("F163-tets", tets_of(RecordKind::Link32, false, &[[0; WIDTH]])),
+        Case::new("F163-tets", tets_of(false, &[[0; WIDTH]])),
         field("F163-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 1),
         broken("F163-widened-boxes", base, Seal::Sections, |e| {
             e.put(offset_of!(Header, required_features), &FEATURE_WIDENED_BOXES.to_le_bytes());

@@ -121,11 +121,16 @@ fn container() -> Vec<Case> {
         broken("F007-tets-that-deform", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, required_features), &8u64.to_le_bytes());
         }),
-        broken("F007-tets-of-20-bytes", "tets-tet16", Seal::Table, |e| {
-            // Ten rows of 16 bytes become eight of 20.
+        // Ten rows of 32 bytes become 20 of 16 or 16 of 20.
+        broken("F007-tets-of-16-bytes", "tets-link32", Seal::Table, |e| {
+            let entry = e.entry_at(0, kind::TETS);
+            e.put(entry + offset_of!(SectionEntry, stride), &16u32.to_le_bytes());
+            e.put(entry + offset_of!(SectionEntry, count), &20u64.to_le_bytes());
+        }),
+        broken("F007-tets-of-20-bytes", "tets-link32", Seal::Table, |e| {
             let entry = e.entry_at(0, kind::TETS);
             e.put(entry + offset_of!(SectionEntry, stride), &20u32.to_le_bytes());
-            e.put(entry + offset_of!(SectionEntry, count), &8u64.to_le_bytes());
+            e.put(entry + offset_of!(SectionEntry, count), &16u64.to_le_bytes());
         }),
         field("F007-tets-with-three-vertices", "tets-link32", kind::OBJECT, offset_of!(Object, record), 2),
         entry("F007-trees-for-ranges-of-time", "sequence", Seal::Table, kind::SEQUENCE_POSITIONS, 0, 27, 4),
@@ -244,7 +249,7 @@ fn tree() -> Vec<Case> {
     let grid = |name, kind, at, value| field(name, "grid-21", kind, at, value);
     vec![
         object("F101-record-without-tets", offset_of!(Object, record), 1),
-        field("F101-other-record", "tets-link32", kind::OBJECT, offset_of!(Object, record), 4),
+        field("F101-other-record", "tets-link32", kind::OBJECT, offset_of!(Object, record), 5),
         object("F102-triangles", offset_of!(Object, triangles), 42),
         object("F102-dropped", offset_of!(Object, dropped), 42),
         object("F103-nan", offset_of!(Object, lower), nan),
@@ -446,7 +451,6 @@ fn tets() -> Vec<Case> {
         field("F127-itself", base, kind::TETS, 32 * middle, middle as u32),
         field("F128-other-neighbour", base, kind::TETS, 32 * middle, 3),
         field("F128-vertex-of-another-leaf", base, kind::TETS, 32 * middle + 4, 8),
-        field("F128-tet16-xor", "tets-tet16", kind::TETS, 16 * 4, 8),
         field("F129-opposite-beyond-the-hull", base, kind::TETS, 12, 0),
         broken("F130-nobody-leads-there", base, Seal::Sections, |e| {
             e.put_u32(kind::TETS, 32 * middle, NONE).put_u32(kind::TETS, 32 * middle + 4, NONE);
@@ -459,7 +463,7 @@ fn tets() -> Vec<Case> {
 
 /// Faults that only `verify` finds: contents that contradict the source geometry or each other.
 fn geometry() -> Vec<Case> {
-    let (base, tets) = ("two-levels", "tets-tet16");
+    let (base, tets) = ("two-levels", "tets-link32");
     let half = 0.5f32.to_bits();
     vec![
         field("F201-other-vertex", base, kind::LINES, LEAF + 132, half),

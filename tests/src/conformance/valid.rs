@@ -20,7 +20,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("widened-boxes", two_levels_widened()),
         Case::new("places", with_places(None)),
         Case::new("places-grid-16", with_places(Some(GridBits::B16))),
-        Case::new("places-tets", tets_of(RecordKind::Link32, true, &[])),
+        Case::new("places-tets", tets_of(true, &[])),
         Case::new("places-deformable", super::deformable::with_places()),
         Case::new("opacity", opacity()),
         Case::new("free-directions", free_directions()),
@@ -37,7 +37,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());
-    cases.extend(RecordKind::ALL.map(|r| Case::new(&format!("tets-{}", r.name()), tets(r))));
+    cases.push(Case::new("tets-link32", tets_of(false, &[])));
     cases
 }
 
@@ -399,11 +399,7 @@ pub(super) const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 
 /// Two cubes as tet leaves, each around two triangles; a triangle leaf; and a triangle without
 /// area.
-fn tets(record: RecordKind) -> Vec<u8> {
-    tets_of(record, false, &[])
-}
-
-pub(super) fn tets_of(record: RecordKind, has_places: bool, leaf_vertices: &[[u32; WIDTH]]) -> Vec<u8> {
+pub(super) fn tets_of(has_places: bool, leaf_vertices: &[[u32; WIDTH]]) -> Vec<u8> {
     let mut positions: Vec<[f32; 3]> = Vec::new();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     let mut parts = TetParts::default();
@@ -415,7 +411,7 @@ pub(super) fn tets_of(record: RecordKind, has_places: bool, leaf_vertices: &[[u3
         let ids = triangles.len() as u32;
         let row = |v: u32| base + rows.iter().position(|r| *r == v).unwrap() as u32;
         triangles.extend(FACES.map(|f| f.map(row)));
-        parts.add(record, &[0, 1, 2, 3, 4, 5, 6, 7].map(point), &CUBE, &FACES, ids);
+        parts.add(&[0, 1, 2, 3, 4, 5, 6, 7].map(point), &CUBE, &FACES, ids);
     }
     let base = positions.len() as u32;
     positions.extend([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.5]]);
@@ -444,7 +440,6 @@ pub(super) fn tets_of(record: RecordKind, has_places: bool, leaf_vertices: &[[u3
         triangle_ids: &[4],
         leaf_vertices,
         places: if has_places { &places } else { &[] },
-        record: Some(record),
         tet_leaves: &parts.leaves,
         tets: &parts.records,
         tet_vertices: &parts.vertices,
@@ -477,36 +472,16 @@ fn is_in_front(points: &[[f32; 3]], face: &[u32; 3], vertex: u32) -> bool {
 
 impl TetParts {
     /// Encodes a tetrahedron with its neighbours and the vertices opposite in them.
-    pub(super) fn push_record(
-        &mut self,
-        record: RecordKind,
-        vertices: [u32; 4],
-        next: [u32; 4],
-        opposite: [u32; 4],
-    ) {
-        let xor = vertices.iter().fold(0, |x, v| x ^ v);
+    pub(super) fn push_record(&mut self, next: [u32; 4], opposite: [u32; 4]) {
         let link = std::array::from_fn(|i| Link { next: next[i], opposite: opposite[i] });
-        match record {
-            RecordKind::Link32 => self.records.extend(Link32 { link }.as_bytes()),
-            RecordKind::Tet16 => {
-                let next = [0, 1, 2].map(|i| next[i] ^ next[3]);
-                self.records.extend(Tet16 { xor, next }.as_bytes());
-            }
-        }
+        self.records.extend(Link32 { link }.as_bytes());
     }
 
     /// Adds a leaf of tetrahedra (ascending vertices) with constrained faces, whose triangles
     /// number from `ids`.
-    pub(super) fn add(
-        &mut self,
-        record: RecordKind,
-        points: &[[f32; 3]],
-        tets: &[[u32; 4]],
-        faces: &[[u32; 3]],
-        ids: u32,
-    ) {
+    pub(super) fn add(&mut self, points: &[[f32; 3]], tets: &[[u32; 4]], faces: &[[u32; 3]], ids: u32) {
         let (first_tet, first_vertex) =
-            ((self.records.len() / record.stride()) as u32, self.vertices.len() as u32);
+            ((self.records.len() / size_of::<Link32>()) as u32, self.vertices.len() as u32);
         let (first_face, first_hull) = (self.faces.len() as u32, self.hulls.len() as u32);
         let (lower, upper) = bounds(points);
         self.vertices.extend(points.iter().map(|p| TetVertex { position: *p, reserved: 0 }));
@@ -555,7 +530,7 @@ impl TetParts {
                     }
                 };
             }
-            self.push_record(record, tet.map(|v| first_vertex + v), next, opposite);
+            self.push_record(next, opposite);
         }
         self.leaves.push(TetLeaf {
             lower,

@@ -24,7 +24,7 @@ pub fn bundle(triangles: u32) -> Vec<u8> {
 
 /// A strip of tetrahedra whose vertices, but for the last, lie on the x axis: a line along it may
 /// touch all faces, so that no sign tells where it leaves a tetrahedron.
-pub fn strip(record: RecordKind, tets: u32) -> Vec<u8> {
+pub fn strip(tets: u32) -> Vec<u8> {
     let mut points: Vec<_> = (0..tets + 2).map(|i| [i as f32 / tets as f32, 0.0, 0.0]).collect();
     points.push([2.0, 1.0, 1.0]);
     let mut parts = TetParts {
@@ -46,7 +46,7 @@ pub fn strip(record: RecordKind, tets: u32) -> Vec<u8> {
             let vertex = [face[0], face[1], face[2]];
             parts.hulls.push(HullFace { vertex, tet: t, opposite: vertices[slot] });
         }
-        parts.push_record(record, vertices, next, opposite);
+        parts.push_record(next, opposite);
     }
     parts.leaves = vec![TetLeaf {
         lower: [0.0; 3],
@@ -67,7 +67,6 @@ pub fn strip(record: RecordKind, tets: u32) -> Vec<u8> {
         bounds: Some(([0.0; 3], [2.0, 1.0, 1.0])),
         root: Child::Tets(0).code(),
         triangles: 1,
-        record: Some(record),
         tet_leaves: &parts.leaves,
         tets: &parts.records,
         tet_vertices: &parts.vertices,

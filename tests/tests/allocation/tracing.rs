@@ -27,8 +27,7 @@ fn rays_that_are_traced_again_allocate_nothing() {
     let corners: Vec<_> = model.triangles.iter().map(|t| t.map(|i| model.positions[i as usize])).collect();
     let mut rays = assorted(&corners, 1024, 1);
     rays.extend(camera(32));
-    // The other records are walked by the same code.
-    let kinds = ["bvh", "bth link32", "tets link32"];
+    let kinds = ["bvh", "bth", "tets"];
     let traced = every_structure(&model, true).into_iter().map(|traced| (traced.name, traced.scene));
     let mut structures: Vec<_> =
         traced.filter(|(name, _)| kinds.iter().any(|kind| name.starts_with(kind))).collect();

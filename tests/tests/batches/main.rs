@@ -7,7 +7,6 @@ use bth::rays::{Hit, Ray, StartRay};
 use bth::{Accept, Isa, Scene, TraceRay};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
-use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
 use bth_tests::rays::{alone, assorted, check_batch, onward, starts};
@@ -21,11 +20,11 @@ pub(crate) fn turn() -> MutexGuard<'static, ()> {
     TURN.lock().unwrap_or_else(|e| e.into_inner())
 }
 
-pub(crate) fn compiled(model: &Model, structure: Structure, record: RecordKind) -> Scene {
+pub(crate) fn compiled(model: &Model, structure: Structure) -> Scene {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("model.ply");
     bth_scenes::write::file(model, &path).expect("a model file");
-    let mut options = CompileOptions { structure, record, ..CompileOptions::default() };
+    let mut options = CompileOptions { structure, ..CompileOptions::default() };
     options.costs.minimum_triangles = 32;
     options.costs.c_tet = Some(1e-3);
     options.tets.worker = bth_tests::worker().map(Into::into);
@@ -68,7 +67,7 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
     }
     let _turn = turn();
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let plain = compiled(model, Structure::Bvh, RecordKind::Link32);
+    let plain = compiled(model, Structure::Bvh);
     let starts = starts_about_hits(&plain, &corners, rays / 2, seed + 1);
     let rays = rays_about_hits(&plain, &corners, rays, seed);
     let (expected, after) = (alone(&plain, &rays), alone(&plain, &starts));
@@ -76,14 +75,12 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
         let some_hits = hits.iter().filter(|hit| hit.is_hit()).count();
         assert!(some_hits > hits.len() / 4 && some_hits < hits.len(), "{some_hits} of {} hit", hits.len());
     }
-    for record in RecordKind::ALL {
-        let scene = compiled(model, structure, record);
-        assert!(!scene.object(0).tet_leaves.is_empty());
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-            isa.choose().expect("an instruction set that is available");
-            check_batch(&scene, &rays, &expected, format_args!("{isa}, {}", record.name()));
-            check_batch(&scene, &starts, &after, format_args!("{isa}, {}", record.name()));
-        }
+    let scene = compiled(model, structure);
+    assert!(!scene.object(0).tet_leaves.is_empty());
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        isa.choose().expect("an instruction set that is available");
+        check_batch(&scene, &rays, &expected, format_args!("{isa}"));
+        check_batch(&scene, &starts, &after, format_args!("{isa}"));
     }
     Isa::best().choose().expect("the best is available");
 }
@@ -124,7 +121,7 @@ fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_s
     let _turn = turn();
     let model = torus_knot(4_000);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
+    let scene = compiled(&model, Structure::Bvh);
     let mut rng = Rng::new(5);
     let mut within = || {
         let [a, b, c] = corners[rng.below(corners.len() as u64) as usize];
@@ -158,7 +155,7 @@ fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_s
 fn a_batch_on_many_threads_has_the_answers_of_one() {
     let _turn = turn();
     let model = gyroid(2000);
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
+    let scene = compiled(&model, Structure::Bvh);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     // More rays than one task takes, and not a multiple of that.
     are_alike_in_parallel(&scene, &rays_about_hits(&scene, &corners, 10_001, 5));
@@ -183,7 +180,7 @@ fn are_alike_in_parallel<R: TraceRay + std::fmt::Debug>(scene: &Scene, rays: &[R
 fn conditions_of_a_batch_are_those_of_its_rays() {
     let _turn = turn();
     let model = gyroid(2000);
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
+    let scene = compiled(&model, Structure::Bvh);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let rays = assorted(&corners, 6_000, 7);
     let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);

@@ -7,7 +7,7 @@ use crate::instances::{instances, world_corners};
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Accept, Cull, Isa, Scene};
 use bth_compile::pipeline::Structure;
-use bth_format::layout::{GridBits, RecordKind};
+use bth_format::layout::GridBits;
 use bth_random::Rng;
 use bth_scenes::{Model, blob::blob, knot::torus_knot, soup::soup};
 use bth_tests::oracle::{self, Triangle};
@@ -238,7 +238,7 @@ fn duplicates_and_shared_edges_and_vertices() {
 
 #[test]
 fn a_ray_through_a_vertex_of_layers_hits_every_triangle_around_it_on_each_layer_in_order() {
-    let scene = compiled(&layers(3), &options(Structure::Bvh, RecordKind::Link32));
+    let scene = compiled(&layers(3), &options(Structure::Bvh));
     let ray = Ray::new([1.0, 1.0, -5.0], [0.0, 0.0, 2.0]);
     let hits = all_hits(&scene, &ray, &Accept::default());
     // Around an inner vertex lie four squares: of two of them both triangles, of the others one,
@@ -266,7 +266,7 @@ fn grids_and_tetrahedra_on_grids() {
     }
     for structure in structures {
         for grid in GridBits::ALL {
-            let mut options = options(structure, RecordKind::Tet16);
+            let mut options = options(structure);
             options.coordinates.bits = Some(grid);
             let scene = compiled(&blob(400), &options);
             let triangles = oracle::triangles(&scene.object(0));

@@ -92,11 +92,11 @@ fn one_option_redoes_what_depends_on_it_and_says_so() {
     let all: Vec<&str> = all.chain(["free-directions"]).collect();
     assert_eq!(misses, all);
 
-    let json = compile(folder.path(), &[&["a.obj", "--set", "record=tet16"][..], &free].concat());
+    let json = compile(folder.path(), &[&["a.obj", "--no-geometry"][..], &free].concat());
     let (hits, misses) = found(&json);
-    assert_eq!(misses, ["file"], "another record: nothing but the file");
+    assert_eq!(misses, ["file"], "without its geometry: nothing but the file");
     assert_eq!(hits.iter().any(|h| h == "tets 1"), tets, "{hits:?}");
-    assert_eq!(json["cache"]["misses"][0]["because"][0], "tets: link32 -> tet16");
+    assert_eq!(json["cache"]["misses"][0]["because"][0], "source geometry: true -> false");
 
     let (hits, misses) = found(&compile(folder.path(), &["a.obj", "--attributes", "all"]));
     assert_eq!((&misses[..], hits.contains(&"bvh 1".into())), (&["file".into(), "mesh".into()][..], true));
@@ -141,8 +141,7 @@ fn a_cache_on_a_read_only_disk_is_used_and_verified() {
 fn the_cache_never_shows_in_the_bytes() {
     let folder = folder(&[("a.obj", &sphere(20))]);
     let (path, out) = (folder.path(), folder.path().join("out.bth"));
-    let variants: [&[&str]; 4] =
-        [&[], &["--quality", "best"], &["--set", "record=tet16"], &["--structure", "bvh"]];
+    let variants: [&[&str]; 4] = [&[], &["--quality", "best"], &["--no-geometry"], &["--structure", "bvh"]];
     let args = |variant: &[&'static str]| [&["a.obj", "-o", "out.bth"], variant].concat();
     let plain: Vec<_> = variants
         .iter()

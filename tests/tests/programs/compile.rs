@@ -94,36 +94,6 @@ fn structure_bvh_has_no_tet_leaves() {
 }
 
 #[test]
-fn compact_tetrahedra_take_at_most_110_bytes_a_triangle() {
-    let folder = folder(&[("ball.obj", &sphere(24))]);
-    let compile = |name: &str, more: &[&str]| {
-        let cheap = [
-            "compile",
-            "ball.obj",
-            "-o",
-            name,
-            "--json",
-            "--set",
-            "c-tet=0.001",
-            "--set",
-            "min-tet-triangles=64",
-        ];
-        let run = bthc(folder.path(), &[&cheap[..], &["--set", "probe=off"], more].concat()).expect(0);
-        bthc(folder.path(), &["verify", name]).expect(0);
-        (run.job()["report"]["file"]["tet_leaves"].as_u64(), std::fs::read(folder.path().join(name)).unwrap())
-    };
-    let compact = compile("compact.bth", &["--compact"]);
-    assert!(compact == compile("long.bth", &["--set", "record=tet16"]), "what it is short for");
-    if compact.0 == Some(0) {
-        println!("skipped: tetrahedra need the worker bth-tetgen");
-        return;
-    }
-    let json = bthc(folder.path(), &["info", "compact.bth", "--json"]).expect(0).json();
-    let bytes = json["resident_bytes"].as_f64().expect("it is told") / f64::from(4 * 24 * 23);
-    assert!(bytes <= 110.0, "{bytes} bytes a triangle");
-}
-
-#[test]
 fn structure_tets_refuses_crossing_triangles_and_says_how_many() {
     let folder = folder(&[("crossing.obj", &crossing())]);
     let run = bthc(folder.path(), &["compile", "crossing.obj", "--structure", "tets", "--json"]).expect(3);

@@ -4,7 +4,6 @@ use crate::check::{corners_of, isas, turn};
 use bth::Isa;
 use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
 use bth_compile::pipeline::Structure;
-use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_tests::meshes::{cube, placed};
 use bth_tests::oracle::is_front;
@@ -20,7 +19,7 @@ fn starts_into_a_closed_surface_hit_it_again() {
     let tiny = placed(knot.clone(), 1e-30, 0.0);
     let models = [knot, far, tiny, cube(4, None), cube(3, Some(rng)), bth_scenes::gyroid::gyroid(1500)];
     for (i, model) in models.iter().enumerate() {
-        let scene = compiled(model, &options(Structure::Bvh, RecordKind::Link32));
+        let scene = compiled(model, &options(Structure::Bvh));
         assert_eq!(scene.is_closed(0), Some(true));
         let corners = corners_of(&scene, 0);
         let (mut inward, mut outward) = (Vec::new(), Vec::new());
@@ -62,8 +61,7 @@ fn starts_into_a_closed_surface_hit_it_again() {
 fn starts_at_corners_and_edges_into_a_cube_hit_it() {
     let _turn = turn();
     for scale in [1.0, 3.0, 1e-25, 1e25] {
-        let scene =
-            compiled(&placed(cube(3, None), scale, 0.0), &options(Structure::Bvh, RecordKind::Link32));
+        let scene = compiled(&placed(cube(3, None), scale, 0.0), &options(Structure::Bvh));
         let rng = &mut Rng::new(7);
         let corners = corners_of(&scene, 0);
         let rays: Vec<StartRay> = (0..3000)

@@ -7,7 +7,7 @@ use bth_compile::Silent;
 use bth_compile::free::KeepFree;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::exact::is_zero_area;
-use bth_format::layout::{GridBits, RecordKind};
+use bth_format::layout::GridBits;
 use bth_random::Rng;
 use bth_scenes::Model;
 use bth_tests::by_day;
@@ -18,7 +18,7 @@ use bth_tests::structures::{deformed, options};
 
 /// The scene of a model in one of the forms, if it has one.
 fn scene_of(model: &Model, form: usize, rng: &mut Rng) -> Option<(&'static str, Scene)> {
-    let mut of_bvh = options(Structure::Bvh, RecordKind::Link32);
+    let mut of_bvh = options(Structure::Bvh);
     let name = match form {
         0 => "plain",
         1 => {
@@ -153,7 +153,7 @@ fn triangles_in_several_leaves() {
 fn models_of_many_nodes() {
     let _turn = turn();
     let model = bth_scenes::knot::torus_knot(3000);
-    let plain = options(Structure::Bvh, RecordKind::Link32);
+    let plain = options(Structure::Bvh);
     for (scale, by) in [(1.0, 0.0), (0.01, 700.0), (1e-20, 0.0)] {
         let scene = compiled(&placed(model.clone(), scale, by), &plain).unwrap();
         let corners = corners_of(&scene, 0);
@@ -172,13 +172,10 @@ fn whole_tetrahedralizations() {
     for (i, model) in
         [cube(3, None), bth_scenes::knot::torus_knot(600), cube(3, Some(rng))].iter().enumerate()
     {
-        for record in RecordKind::ALL {
-            let of = options(Structure::Tets, record);
-            let scene = compiled(model, &of).unwrap();
-            assert!(!scene.object(0).tet_leaves.is_empty());
-            let corners = corners_of(&scene, 0);
-            let rays = rays(&scene, &corners, by_day(20, 60), i as u64);
-            check(&scene, &corners, &rays, &format!("tets, model {i}, {}", record.name()));
-        }
+        let scene = compiled(model, &options(Structure::Tets)).unwrap();
+        assert!(!scene.object(0).tet_leaves.is_empty());
+        let corners = corners_of(&scene, 0);
+        let rays = rays(&scene, &corners, by_day(20, 60), i as u64);
+        check(&scene, &corners, &rays, &format!("tets, model {i}"));
     }
 }

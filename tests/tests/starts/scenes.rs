@@ -6,7 +6,6 @@ use bth::rays::{Hit, StartRay};
 use bth::{Accept, Scene, SceneBuilder};
 use bth_compile::free::KeepFree;
 use bth_compile::pipeline::{CompileOptions, Structure};
-use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::Model;
 use bth_tests::by_day;
@@ -97,7 +96,7 @@ fn instances_under_exact_transforms_agree_with_the_oracle() {
     for seed in 0..by_day(5, 10) {
         let rng = &mut Rng::new(seed);
         let models = [cube(1 + seed as usize % 2, None), mesh(0, rng)];
-        let objects = models.clone().map(|m| compiled(&m, &options(Structure::Bvh, RecordKind::Link32)));
+        let objects = models.clone().map(|m| compiled(&m, &options(Structure::Bvh)));
         let scene = placed(&objects, [1, 2, 5, 20][seed as usize % 4], || exact_transform(rng));
         // With coarse weights nothing is rounded in the world or on the way into other instances.
         let mut rays = rays(&scene, &models, [80, 60, 30, 10][seed as usize % 4], rng);
@@ -132,7 +131,7 @@ fn instances_under_any_transform_agree_with_themselves() {
     for seed in 0..by_day(5, 10) {
         let rng = &mut Rng::new(100 + seed);
         let models = [mesh(7, rng), bth_scenes::knot::torus_knot(700)];
-        let mut of = options(Structure::Bvh, RecordKind::Link32);
+        let mut of = options(Structure::Bvh);
         let deformable = seed % 5 == 4;
         of.free.keep = [KeepFree::None, KeepFree::All, KeepFree::Distances][seed as usize % 3];
         if deformable {

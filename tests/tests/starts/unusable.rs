@@ -4,7 +4,6 @@ use crate::check::{check_isas, turn};
 use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
 use bth::{Accept, Code, Crossings, Scene, SceneBuilder};
 use bth_compile::pipeline::{CompileOptions, Structure};
-use bth_format::layout::RecordKind;
 use bth_tests::meshes::cube;
 use bth_tests::rays::starts;
 use bth_tests::structures::{compiled, options};
@@ -71,7 +70,7 @@ fn wrong_numbers_in_one_object_and_in_scenes() {
     let _turn = turn();
     let model = cube(2, None);
     let count = model.triangles.len() as u32;
-    let options = options(Structure::Bvh, RecordKind::Link32);
+    let options = options(Structure::Bvh);
     let one = compiled(&model, &options);
     check_weights(&one, count);
     let deformable = compiled(&model, &CompileOptions { deformable: true, ..options });
@@ -84,7 +83,7 @@ fn wrong_numbers_in_one_object_and_in_scenes() {
         check_weights(builder.scene(), count);
     }
     if bth_tests::worker().is_some() {
-        let tets = bth_tests::structures::options(Structure::Tets, RecordKind::Link32);
+        let tets = bth_tests::structures::options(Structure::Tets);
         check_weights(&compiled(&model, &tets), count);
     }
 }
@@ -93,7 +92,7 @@ fn wrong_numbers_in_one_object_and_in_scenes() {
 fn triangles_that_have_lost_their_area_are_no_starts_until_they_have_one() {
     let _turn = turn();
     let model = cube(1, None);
-    let of_bvh = options(Structure::Bvh, RecordKind::Link32);
+    let of_bvh = options(Structure::Bvh);
     let mut scene = compiled(&model, &CompileOptions { deformable: true, ..of_bvh });
     let rest = scene.object(0).positions.to_vec();
     let flat = scene.object(0).triangles[0];
@@ -125,7 +124,7 @@ fn triangles_that_have_lost_their_area_are_no_starts_until_they_have_one() {
 fn hidden_and_removed_instances_are_no_starts() {
     let _turn = turn();
     let model = cube(1, None);
-    let one = compiled(&model, &options(Structure::Bvh, RecordKind::Link32));
+    let one = compiled(&model, &options(Structure::Bvh));
     let mut builder = SceneBuilder::new();
     let object = builder.add(&one);
     let instances: Vec<u32> = (0..3).map(|_| builder.instance(object, &IDENTITY).unwrap()).collect();

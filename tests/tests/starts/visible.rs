@@ -4,7 +4,6 @@ use crate::check::corners_of;
 use bth::SegmentEnd;
 use bth::rays::{PrimitiveRef, Start};
 use bth_compile::pipeline::Structure;
-use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_tests::meshes::{KINDS, cube, mesh, placed};
 use bth_tests::oracle::starts;
@@ -39,7 +38,7 @@ fn points_see_each_other_as_exact_arithmetic_says_in_both_directions() {
     models.extend((0..3 * KINDS).map(|kind| mesh(kind % KINDS, rng)));
     let mut seen = [0; 2];
     for (i, model) in models.iter().enumerate() {
-        let scene = compiled(model, &options(Structure::Bvh, RecordKind::Link32));
+        let scene = compiled(model, &options(Structure::Bvh));
         let corners = corners_of(&scene, 0);
         for _ in 0..150 {
             let (a, b) = (end(rng, &corners), end(rng, &corners));
@@ -58,7 +57,7 @@ fn points_see_each_other_as_exact_arithmetic_says_in_both_directions() {
 
 #[test]
 fn ends_that_are_no_points_see_nothing() {
-    let scene = compiled(&cube(2, None), &options(Structure::Bvh, RecordKind::Link32));
+    let scene = compiled(&cube(2, None), &options(Structure::Bvh));
     let on = |instance, u| Start { primitive: PrimitiveRef { instance, triangle: 0 }, u, v: 0.25 };
     let good = on(0, 0.25);
     for bad in [on(1, 0.25), on(0, f32::NAN), on(0, 0.9), Start::NONE] {

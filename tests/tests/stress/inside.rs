@@ -4,7 +4,6 @@
 use bth::rays::Ray;
 use bth::{Crossings, Scene};
 use bth_compile::pipeline::Structure;
-use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::Model;
 use bth_tests::stress::{Corners, InsideStatistics, is_closed, run_inside, shapes};
@@ -12,7 +11,7 @@ use bth_tests::structures::{compiled, every_structure, options};
 use bth_tests::{by_day, oracle};
 
 fn bvh(model: &Model) -> Scene {
-    compiled(model, &options(Structure::Bvh, RecordKind::Link32))
+    compiled(model, &options(Structure::Bvh))
 }
 
 fn corners_of(scene: &Scene) -> Vec<Corners> {
@@ -185,7 +184,7 @@ fn winding_numbers_in_closed_scans_are_exact() {
             println!("SKIPPED: no {} (set BTH_DATA to the folder of the test models)", path.display());
             continue;
         }
-        let options = options(Structure::Bvh, RecordKind::Link32);
+        let options = options(Structure::Bvh);
         let (file, _) = bth_compile::pipeline::compile(&path, &options, &bth_compile::Silent).unwrap();
         let scene = bth::from_bytes(&file.bytes).unwrap();
         let corners = corners_of(&scene);

@@ -4,7 +4,6 @@ use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure};
-use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::Model;
 use bth_scenes::{blob::blob, soup::soup};
@@ -142,7 +141,7 @@ fn cutting_into_instances_changes_no_answer() {
         }
         // Among hits at the same t, rounded, the smallest instance is reported; within an object
         // the nearest is.
-        let whole = structures::compiled(&model, &structures::options(Structure::Bvh, RecordKind::Link32));
+        let whole = structures::compiled(&model, &structures::options(Structure::Bvh));
         compare(&hits(&whole, &rays), &ours, |id| id, false);
     }
 }

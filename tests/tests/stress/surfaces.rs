@@ -2,7 +2,6 @@
 
 use bth::rays::{Hit, PrimitiveRef};
 use bth_compile::pipeline::Structure;
-use bth_format::layout::RecordKind;
 use bth_tests::by_day;
 use bth_tests::stress::{Kind, Statistics, rays, run, shapes};
 use bth_tests::structures::{Traced, compiled, deformed, every_structure, options};
@@ -26,7 +25,7 @@ fn no_ray_leaks_misses_or_hits_a_ghost_on_any_closed_surface() {
 #[test]
 fn hierarchies_beyond_all_scales_are_walked_from_minus_infinity() {
     for shape in shapes(4).iter().filter(|shape| shape.name.contains("scale 2^")) {
-        let scene = compiled(&shape.grid.model(), &options(Structure::Bvh, RecordKind::Link32));
+        let scene = compiled(&shape.grid.model(), &options(Structure::Bvh));
         let mut tally = Statistics::default();
         // Three batches: one for each instruction set.
         run(shape, &[Traced { name: "bvh".into(), scene }], 3 * by_day(1024, 4096), 0, 8, &mut tally);

@@ -66,8 +66,6 @@ fn measure(command: &Command) -> Result<(Report, &RunOptions)> {
         Command::Scenes(arguments) => (scenes::measure(arguments)?, &arguments.run),
         Command::Truth(arguments) => (truth::measure(arguments)?, &arguments.run),
         Command::Paper(arguments) => (paper::measure(arguments)?, &arguments.run),
-        _ => bail!(
-            "expected a command that makes a report: speed, truth, stress, load, scenes or paper"
-        ),
+        _ => bail!("expected a command that makes a report: speed, truth, stress, load, scenes or paper"),
     })
 }

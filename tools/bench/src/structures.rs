@@ -7,7 +7,6 @@ use bth::rays::{Hit, Ray, Ray64, Start, StartRay};
 use bth::{Accept, Scene};
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
-use bth_format::layout::RecordKind;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -20,22 +19,19 @@ pub struct Kind {
     /// Its name in tables.
     pub name: &'static str,
     structure: Structure,
-    record: RecordKind,
     free: KeepFree,
 }
 
-const LINK32: Kind =
-    Kind { name: "", structure: Structure::Tets, record: RecordKind::Link32, free: KeepFree::None };
+const TETS: Kind = Kind { name: "tets", structure: Structure::Tets, free: KeepFree::None };
 
 /// The structures. The default file comes first, then the plain BVH, which also finds the hits that
 /// secondary rays start from.
-pub const KINDS: [Kind; 6] = [
-    Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
-    Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
-    Kind { name: "tets link32", ..LINK32 },
-    Kind { name: "tets tet16", record: RecordKind::Tet16, ..LINK32 },
-    Kind { name: "bvh free", structure: Structure::Bvh, free: KeepFree::All, ..LINK32 },
-    Kind { name: "bvh distances", structure: Structure::Bvh, free: KeepFree::Distances, ..LINK32 },
+pub const KINDS: [Kind; 5] = [
+    Kind { name: "bth", structure: Structure::Bth, ..TETS },
+    Kind { name: "bvh", structure: Structure::Bvh, ..TETS },
+    TETS,
+    Kind { name: "bvh free", structure: Structure::Bvh, free: KeepFree::All },
+    Kind { name: "bvh distances", structure: Structure::Bvh, free: KeepFree::Distances },
 ];
 
 /// The ways to trace a structure, and the suffixes of their names.
@@ -76,7 +72,6 @@ impl Kind {
     pub(crate) fn options(&self) -> CompileOptions {
         CompileOptions {
             structure: self.structure,
-            record: self.record,
             free: FreeOptions { keep: self.free, ..FreeOptions::default() },
             ..CompileOptions::default()
         }

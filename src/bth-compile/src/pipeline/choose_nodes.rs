@@ -29,11 +29,11 @@ impl Stage for ChooseNodes<'_> {
         let (mesh, tree) = (&traced.mesh, &traced.tree);
         let found = match (options.structure, marks) {
             (Structure::Bth, Some(marks)) => {
-                let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, options.record, monitor)?;
+                let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, monitor)?;
                 Some((choice, Some(report)))
             }
             (Structure::Bth, None) if options.costs.more_suitable_gain_more() => {
-                let (choice, report) = costs::choose_of_all(mesh, tree, &options.costs, options.record, monitor)?;
+                let (choice, report) = costs::choose_of_all(mesh, tree, &options.costs, monitor)?;
                 choice.chosen.is_empty().then_some((choice, Some(report)))
             }
             (Structure::Tets, Some(marks)) => match marks.suitable.first() {

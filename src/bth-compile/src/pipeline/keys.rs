@@ -23,7 +23,7 @@ use bth_files::Digest;
 use std::path::Path;
 
 /// Version of compiled files.
-const FILE: &str = "5";
+const FILE: &str = "6";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = BuildPoses::VERSION;
 
@@ -100,7 +100,6 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         free,
         costs,
         tets,
-        record,
         geometry,
         deformable,
         motion,
@@ -132,7 +131,6 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     if structure != Structure::Bvh {
         let TetOptions { cells, minimum, .. } = tets;
         all.extend([
-            ("tets", record.name().to_owned()),
             ("tetrahedralization", CachedNodes::attempts(tets)),
             ("cells", format!("{cells:?} from {minimum}")),
             ("tetgen", tetgen.to_owned()),

@@ -62,7 +62,7 @@ impl Stage for Collapse<'_> {
         let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = leaves.into_iter().unzip();
         let (wide, report) = collapse(traced.by_ref(), &cut, options, monitor)?;
         let triangles = traced.mesh.triangles.len();
-        let encoded = (!meshes.is_empty()).then(|| tets::encode(&meshes, options.record, triangles));
+        let encoded = (!meshes.is_empty()).then(|| tets::encode(&meshes, triangles));
         let grid = traced.on_grid.as_ref().map(|on_grid| &on_grid.grid);
         let places = bvh::triangle_places(&wide, grid, triangles);
         let object = Object {
@@ -146,7 +146,6 @@ impl Object {
             parts.opacity_micro = &opacity.micro;
         }
         if let Some(encoded) = &self.encoded {
-            parts.record = Some(options.record);
             parts.tet_leaves = &encoded.leaves;
             parts.tets = &encoded.tets;
             parts.tet_vertices = &encoded.vertices;

@@ -59,7 +59,6 @@ fn options_json(options: &CompileOptions) -> Value {
         "structure": options.structure,
         "quality": options.bvh.quality,
         "attributes": options.attributes,
-        "tets": options.record.name(),
         "selection": (options.structure == Structure::Bth).then_some(&options.costs),
         "geometry": options.geometry,
     });

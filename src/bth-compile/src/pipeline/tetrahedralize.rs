@@ -58,7 +58,7 @@ impl Stage for Probe<'_> {
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         let Self { mesh, tree, built, options } = self;
         let made = match options.structure {
-            Structure::Bth => costs::probe(mesh, tree, built, &options.costs, options.record, monitor)?,
+            Structure::Bth => costs::probe(mesh, tree, built, &options.costs, monitor)?,
             Structure::Bvh | Structure::Tets => (built, None),
         };
         Ok(made)

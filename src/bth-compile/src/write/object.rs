@@ -30,8 +30,6 @@ pub struct ObjectParts<'a> {
     pub triangle_ids: &'a [u32],
     /// Vertices of the source in each leaf; empty but in deformable objects.
     pub leaf_vertices: &'a [[u32; WIDTH]],
-    /// Record of the tetrahedra; `None` without tet leaves.
-    pub record: Option<RecordKind>,
     /// Tet leaves.
     pub tet_leaves: &'a [TetLeaf],
     /// The records' bytes.
@@ -103,14 +101,14 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         return Err(Error::Limit { code: "BTH-L031", message });
     }
     // Without tet leaves there are no sections of tetrahedra and faces.
-    let record = parts.record.filter(|_| !parts.tet_leaves.is_empty());
+    let has_tets = !parts.tet_leaves.is_empty();
     let (lower, upper) = parts.bounds.unwrap_or_default();
     let (coordinates, grid_origin) = parts.grid.map_or_else(Default::default, |(grid, _)| grid.fields());
     let header = Object {
         lower,
         upper,
         root: parts.root,
-        record: record.map_or(0, |r| r as u32),
+        record: if has_tets { LINK32 } else { 0 },
         triangles: parts.triangles,
         dropped: parts.dropped,
         depth,
@@ -124,13 +122,13 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.rows(kind::TRIANGLE_IDS, index, parts.triangle_ids)?;
     builder.rows(kind::LEAF_VERTICES, index, parts.leaf_vertices)?;
     builder.rows(kind::TET_LEAVES, index, parts.tet_leaves)?;
-    if let Some(record) = record {
-        builder.section(kind::TETS, index, record.stride() as u32, parts.tets)?;
+    if has_tets {
+        builder.section(kind::TETS, index, size_of::<Link32>() as u32, parts.tets)?;
     }
     builder.rows(kind::TET_VERTICES, index, parts.tet_vertices)?;
     builder.rows(kind::TET_FACES, index, parts.tet_faces)?;
     builder.rows(kind::HULL_FACES, index, parts.hull_faces)?;
-    if record.is_some() {
+    if has_tets {
         builder.rows(kind::TRIANGLE_FACES, index, parts.triangle_faces)?;
     }
     builder.rows(kind::TRIANGLE_PLACES, index, parts.places)?;

@@ -1,14 +1,14 @@
 //! The vertices and links of the tetrahedra of a tet leaf, derived as a traversal derives them.
 //!
-//! The compact records hold neither all vertices nor, in Tet16, all links of a tetrahedron: a
-//! traversal derives them from the tetrahedron that it came from. So does this file, from a leaf's
+//! A record does not hold the vertices of its tetrahedron: a traversal derives them from the
+//! tetrahedron that it came from. So does this file, from a leaf's
 //! first hull face through every tetrahedron. [`super::tet_faces`] then compares every record, hull
 //! face and constrained face with the result, so that no traversal, wherever it starts, can derive
 //! anything else. Specification: "Records" and the text below the table of "Index check".
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::object::{ObjectView, Records};
+use crate::object::ObjectView;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -21,8 +21,6 @@ pub(crate) struct TetAdjacency<'a> {
     face_rows: Range<u32>,
     /// Per tetrahedron its vertices, ascending; [`UNREACHED`] until it is reached.
     vertices: Vec<[u32; 4]>,
-    /// Per tetrahedron the link of its last slot, which Tet16 lacks; empty for other records.
-    last_link: Vec<u32>,
 }
 
 const UNREACHED: [u32; 4] = [NONE; 4];
@@ -51,11 +49,10 @@ impl<'a> TetAdjacency<'a> {
             vertex_rows: leaf.first_vertex..leaf.first_vertex + leaf.vertices,
             face_rows: leaf.first_face..leaf.first_face + leaf.faces,
             vertices: vec![UNREACHED; count],
-            last_link: if matches!(view.records, Records::Tet16(_)) { vec![NONE; count] } else { Vec::new() },
         };
         let hull = &view.hull_faces[leaf.first_hull as usize];
         let vertices = this.hull_vertices(leaf.first_hull)?;
-        this.reach(Neighbour { tet: hull.tet, opposite: hull.opposite, back: NONE }, vertices);
+        this.vertices[(hull.tet - leaf.first_tet) as usize] = vertices;
         let mut stack = vec![hull.tet];
         while let Some(tet) = stack.pop() {
             for slot in 0..4 {
@@ -77,31 +74,9 @@ impl<'a> TetAdjacency<'a> {
         self.vertices[(tet - self.tets.start) as usize]
     }
 
-    /// Links of a tetrahedron that has been reached.
+    /// Links of a tetrahedron.
     pub(crate) fn links(&self, tet: u32) -> [u32; 4] {
-        let row = tet as usize;
-        match self.view.records {
-            Records::None => [NONE; 4],
-            Records::Link32(r) => r[row].link.map(|l| l.next),
-            Records::Tet16(r) => {
-                let last = self.last_link[(tet - self.tets.start) as usize];
-                let [a, b, c] = r[row].next.map(|n| n ^ last);
-                [a, b, c, last]
-            }
-        }
-    }
-
-    /// Records that a tetrahedron with these vertices was reached through the face opposite to one
-    /// of them.
-    fn reach(&mut self, neighbour: Neighbour, vertices: [u32; 4]) {
-        let Neighbour { tet, opposite, back } = neighbour;
-        let i = (tet - self.tets.start) as usize;
-        self.vertices[i] = vertices;
-        if let Records::Tet16(r) = self.view.records {
-            let slot = vertices.iter().position(|v| *v == opposite).expect("it is one of the four vertices");
-            // The first three links are stored combined with the last one.
-            self.last_link[i] = if slot == 3 { back } else { r[tet as usize].next[slot] ^ back };
-        }
+        self.view.records[tet as usize].link.map(|l| l.next)
     }
 
     /// BTH-F128: crosses a face of a reached tetrahedron. Returns the neighbour where it is reached
@@ -117,7 +92,7 @@ impl<'a> TetAdjacency<'a> {
         }
         let (found, known) = (sorted(face, next.opposite), self.vertices(next.tet));
         if known == UNREACHED {
-            self.reach(next, found);
+            self.vertices[(next.tet - self.tets.start) as usize] = found;
             return Ok(Some(next.tet));
         }
         if known != found {
@@ -140,13 +115,7 @@ impl<'a> TetAdjacency<'a> {
             let found = format!("tetrahedron {link}");
             return Err(self.error(Code::Link, tet, "another tetrahedron of the leaf", found));
         }
-        let row = link as usize;
-        let [a, b, c] = others(self.vertices(tet), slot);
-        let opposite = match self.view.records {
-            Records::None => NONE,
-            Records::Link32(r) => r[tet as usize].link[slot].opposite,
-            Records::Tet16(r) => r[row].xor ^ a ^ b ^ c,
-        };
+        let opposite = self.view.records[tet as usize].link[slot].opposite;
         Ok(Some(Neighbour { tet: link, opposite, back: tet }))
     }
 
@@ -199,8 +168,7 @@ impl<'a> TetAdjacency<'a> {
         expected: impl Into<Cow<'static, str>>,
         found: impl Into<Cow<'static, str>>,
     ) -> Error {
-        let stride = RecordKind::from_code(self.view.header.record).map_or(0, RecordKind::stride);
-        Error::within(code, kind::TETS, u64::from(tet) * stride as u64, expected, found)
+        Error::within(code, kind::TETS, u64::from(tet) * size_of::<Link32>() as u64, expected, found)
     }
 }
 

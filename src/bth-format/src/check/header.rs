@@ -4,7 +4,7 @@ use super::nodes::is_box;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::limits::{MAX_DEPTH, MAX_TRIANGLES};
-use crate::object::{ObjectView, Records};
+use crate::object::ObjectView;
 use std::mem::offset_of;
 
 pub(super) fn check(view: &ObjectView) -> Result<()> {
@@ -20,12 +20,7 @@ fn fail(code: Code, offset: usize, expected: String, found: String) -> Result<()
 /// BTH-F101: the record kind matches the TETS section.
 fn record(view: &ObjectView) -> Result<()> {
     let record = view.header.record;
-    let fits = match view.records {
-        Records::None => record == 0 && view.tet_leaves.is_empty(),
-        Records::Link32(_) => record == RecordKind::Link32 as u32,
-        Records::Tet16(_) => record == RecordKind::Tet16 as u32,
-    };
-    if !fits {
+    if record != LINK32 && !(record == 0 && view.tet_leaves.is_empty()) {
         let found = format!("{record} with {} tet leaves", view.tet_leaves.len());
         return fail(Code::Record, offset_of!(Object, record), "the kind of the records".into(), found);
     }

@@ -1,11 +1,11 @@
-//! Hull faces, constrained faces, links and records of tet leaves, compared with the derived
+//! Hull faces, constrained faces and links of tet leaves, compared with the derived
 //! tetrahedra.
 
 use super::adjacency::{Neighbour, TetAdjacency, is_same_face, others};
 use super::bit_set::BitSet;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::object::{ObjectView, Records};
+use crate::object::ObjectView;
 
 /// Checks the tetrahedra of every tet leaf: BTH-F125 to BTH-F130.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
@@ -13,10 +13,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         let tets = TetAdjacency::derive(view, leaf)?;
         check_hull_faces(&tets, leaf)?;
         check_constrained_faces(&tets, leaf)?;
-        tets.tets.clone().try_for_each(|tet| {
-            check_links(&tets, tet)?;
-            check_record(&tets, tet)
-        })
+        tets.tets.clone().try_for_each(|tet| check_links(&tets, tet))
     })
 }
 
@@ -72,7 +69,7 @@ fn check_constrained_faces(tets: &TetAdjacency, leaf: &TetLeaf) -> Result<()> {
     Ok(())
 }
 
-/// BTH-F128 and BTH-F129: neighbours refer back, and Link32 names the vertices beyond.
+/// BTH-F128 and BTH-F129: neighbours refer back, and links name the vertices beyond.
 fn check_links(tets: &TetAdjacency, tet: u32) -> Result<()> {
     for (slot, link) in tets.links(tet).into_iter().enumerate() {
         let neighbour = tets.neighbour(tet, slot)?;
@@ -84,29 +81,12 @@ fn check_links(tets: &TetAdjacency, tet: u32) -> Result<()> {
                 return Err(tets.error(Code::Neighbour, next, expected, format!("{found:?}")));
             }
         }
-        if let Records::Link32(r) = tets.view.records {
-            let found = r[tet as usize].link[slot].opposite;
-            let expected = neighbour.map_or(NONE, |n| n.opposite);
-            if found != expected {
-                let expected = format!("opposite vertex {expected} beyond slot {slot}");
-                return Err(tets.error(Code::TetRecord, tet, expected, format!("{found}, link {link}")));
-            }
+        let found = tets.view.records[tet as usize].link[slot].opposite;
+        let expected = neighbour.map_or(NONE, |n| n.opposite);
+        if found != expected {
+            let expected = format!("opposite vertex {expected} beyond slot {slot}");
+            return Err(tets.error(Code::TetRecord, tet, expected, format!("{found}, link {link}")));
         }
     }
     Ok(())
-}
-
-/// BTH-F129: a record holds the vertices of its tetrahedron.
-fn check_record(tets: &TetAdjacency, tet: u32) -> Result<()> {
-    let (row, vertices) = (tet as usize, tets.vertices(tet));
-    let xor = vertices.iter().fold(0, |x, v| x ^ v);
-    let right = match tets.view.records {
-        Records::None | Records::Link32(_) => true,
-        Records::Tet16(r) => r[row].xor == xor,
-    };
-    if right {
-        return Ok(());
-    }
-    let expected = format!("the vertices {vertices:?} and their exclusive or {xor}");
-    Err(tets.error(Code::TetRecord, tet, expected, "others"))
 }

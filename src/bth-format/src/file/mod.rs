@@ -18,7 +18,7 @@ use crate::Identity;
 use crate::check;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::object::{ExactPositions, MAX_LINES, ObjectBounds, ObjectView, Records};
+use crate::object::{ExactPositions, MAX_LINES, ObjectBounds, ObjectView};
 use crate::view;
 use buffer::Buffer;
 use std::path::Path;
@@ -282,25 +282,18 @@ impl File {
         }
         let header: &[Object] = self.slice(object, kind::OBJECT);
         let header = &header[0];
-        let entry = self.section(object, kind::TETS).map(|s| *s.entry);
-        let stride = entry.map_or(0, |e| e.stride as usize);
-        let records = match RecordKind::from_code(header.record) {
-            Some(record) if entry.is_some() && record.stride() == stride => match record {
-                RecordKind::Link32 => Records::Link32(self.slice(object, kind::TETS)),
-                RecordKind::Tet16 => Records::Tet16(self.slice(object, kind::TETS)),
-            },
-            None if header.record == 0 && entry.is_none_or(|e| e.count == 0) => Records::None,
-            _ => {
-                let found = format!("record kind {} and a TETS stride of {stride}", header.record);
-                let (code, found) = match OLD_RECORDS.contains(&header.record) {
-                    true => (Code::Features, found + ", which are no longer read; compile the model again"),
-                    false => (Code::Record, found),
-                };
-                let offset = std::mem::offset_of!(Object, record) as u64;
-                let error = Error::within(code, kind::OBJECT, offset, "a record kind that fits TETS", found);
-                return Err(self.locate(error, object));
-            }
-        };
+        let records: &[Link32] = self.slice(object, kind::TETS);
+        let has_records = self.section(object, kind::TETS).is_some();
+        if !(header.record == LINK32 && has_records || header.record == 0 && records.is_empty()) {
+            let found = format!("record kind {} and {} rows of TETS", header.record, records.len());
+            let (code, found) = match OLD_RECORDS.contains(&header.record) {
+                true => (Code::Features, found + ", which are no longer read; compile the model again"),
+                false => (Code::Record, found),
+            };
+            let offset = std::mem::offset_of!(Object, record) as u64;
+            let error = Error::within(code, kind::OBJECT, offset, "a record kind that fits TETS", found);
+            return Err(self.locate(error, object));
+        }
         let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
         let lines: &[CacheLine] = self.slice(object, kind::LINES);
         let mut bounds = ObjectBounds::new(header);

@@ -247,15 +247,16 @@ fn check_entry(
             return Err((Code::UnknownKind, 0, "a known kind".into(), format!("{}", e.kind)));
         }
         None => {}
-        Some(0) if RecordKind::ALL.iter().any(|r| r.stride() == e.stride as usize) => {}
-        Some(stride) if stride == e.stride as usize && stride != 0 => {}
-        Some(0) if e.stride == 20 => {
-            let found = "20, which is no longer read; compile the model again".into();
-            return Err((Code::Features, offset_of!(SectionEntry, stride), "16 or 32".into(), found));
-        }
+        Some(stride) if stride == e.stride as usize => {}
         Some(stride) => {
-            let expected = if stride == 0 { "16 or 32".into() } else { format!("{}", stride) };
-            return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, format!("{}", e.stride)));
+            let (code, more) = match (e.kind, e.stride) {
+                (kind::TETS, 16 | 20) => {
+                    (Code::Features, ", which is no longer read; compile the model again")
+                }
+                _ => (Code::Stride, ""),
+            };
+            let found = format!("{}{more}", e.stride);
+            return Err((code, offset_of!(SectionEntry, stride), format!("{stride}"), found));
         }
     }
     if e.kind != kind::OBJECT && e.count > max_count(e.kind) {

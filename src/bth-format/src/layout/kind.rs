@@ -16,8 +16,7 @@ macro_rules! kinds {
             }
         }
 
-        /// Bytes of an element of a section; `None` for unknown kinds, 0 for [`TETS`], whose stride
-        /// is the stride of a [`RecordKind`].
+        /// Bytes of an element of a section; `None` for unknown kinds.
         pub fn stride(kind: u32) -> Option<usize> {
             match kind {
                 $($name => Some(size_of::<$row>()),)*
@@ -36,8 +35,8 @@ kinds! {
     TRIANGLE_IDS = 3: u32;
     /// [`super::TetLeaf`]s.
     TET_LEAVES = 4: TetLeaf;
-    /// [`super::Link32`] or [`super::Tet16`] records.
-    TETS = 5: [u8; 0];
+    /// [`super::Link32`] records.
+    TETS = 5: Link32;
     /// [`super::TetVertex`] positions.
     TET_VERTICES = 6: TetVertex;
     /// [`super::TetFace`]s, one per constrained face.

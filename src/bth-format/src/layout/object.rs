@@ -14,7 +14,7 @@ pub struct Object {
     pub upper: [f32; 3],
     /// Code of the root, a [`super::Child`]; `NONE` when nothing can be hit.
     pub root: u32,
-    /// Tetrahedron record: a [`super::RecordKind`], or 0 without tet leaves.
+    /// [`super::LINK32`], or 0 without tet leaves.
     pub record: u32,
     /// Number of triangles of the source; triangle ids are below it.
     pub triangles: u32,

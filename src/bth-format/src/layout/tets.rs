@@ -3,43 +3,11 @@
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// The record that the `TETS` section holds, as in [`super::Object::record`]. Specification:
-/// "Records".
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u32)]
-pub enum RecordKind {
-    /// [`Link32`].
-    Link32 = 1,
-    /// [`Tet16`].
-    Tet16 = 4,
-}
+/// The code of [`Link32`] in [`super::Object::record`], which is 0 without tetrahedra.
+pub const LINK32: u32 = 1;
 
-/// Codes of the records of older files, of 32 and 20 bytes. Such files are refused.
-pub(crate) const OLD_RECORDS: [u32; 2] = [2, 3];
-
-impl RecordKind {
-    /// All kinds, in order of their codes.
-    pub const ALL: [RecordKind; 2] = [Self::Link32, Self::Tet16];
-
-    /// The kind with this code.
-    pub fn from_code(code: u32) -> Option<Self> {
-        Self::ALL.into_iter().find(|k| *k as u32 == code)
-    }
-    /// Bytes of a record.
-    pub const fn stride(self) -> usize {
-        match self {
-            Self::Link32 => 32,
-            Self::Tet16 => 16,
-        }
-    }
-    /// Name in lower case, as on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Link32 => "link32",
-            Self::Tet16 => "tet16",
-        }
-    }
-}
+/// Codes of the records of older files, of 32, 20 and 16 bytes. Such files are refused.
+pub(crate) const OLD_RECORDS: [u32; 3] = [2, 3, 4];
 
 /// A leaf of the BVH that is a constrained tetrahedralization: tetrahedra that fill a box and have
 /// its triangles as faces.
@@ -115,7 +83,7 @@ pub struct HullFace {
 /// and [`super::NONE`] outside the hull.
 pub const FACE_BIT: u32 = 1 << 31;
 
-/// Record of 32 bytes: four links with the vertex beyond each, in ascending order of the vertex
+/// A tetrahedron: four links with the vertex beyond each, in ascending order of the vertex
 /// opposite to the link's face.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
@@ -135,22 +103,10 @@ pub struct Link {
     pub opposite: u32,
 }
 
-/// Record of 16 bytes of Aman et al. 2021, arXiv 2103.02309. Links are in ascending order of the
-/// vertex opposite to the link's face: see [`FACE_BIT`].
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Tet16 {
-    /// Exclusive or of all four vertices.
-    pub xor: u32,
-    /// The first three links, each exclusive-or'ed with the fourth.
-    pub next: [u32; 3],
-}
-
 assert_layout! {
     TetLeaf 64 { upper 12, first_tet 24, first_vertex 32, first_face 40, first_hull 48, subtree 56, flags 60 }
     TetVertex 16 { reserved 12 }
     TetFace 32 { triangle 12, tet 16, opposite 24 }
     HullFace 20 { tet 12, opposite 16 }
     Link32 32 {}
-    Tet16 16 { next 4 }
 }

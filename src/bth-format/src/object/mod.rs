@@ -11,7 +11,6 @@ mod leaves;
 mod nodes;
 mod opacity;
 mod places;
-mod records;
 mod view;
 
 pub use bounds::{GREATEST_IN_F32, ObjectBounds, WIDENED_RANGE, far_away};
@@ -19,5 +18,4 @@ pub use exact::{EXACT_RANGE, ExactPositions, relative_to_anchor};
 pub use leaves::Unpacked;
 pub(crate) use nodes::MAX_LINES;
 pub use nodes::NodeBase;
-pub use records::Records;
 pub use view::ObjectView;

@@ -2,7 +2,6 @@
 
 use super::bounds::ObjectBounds;
 use super::exact::ExactPositions;
-use super::records::Records;
 use crate::Identity;
 use crate::layout::*;
 
@@ -30,7 +29,7 @@ pub struct ObjectView<'a> {
     /// Tet leaves.
     pub tet_leaves: &'a [TetLeaf],
     /// Tetrahedra of all tet leaves.
-    pub records: Records<'a>,
+    pub records: &'a [Link32],
     /// Vertices of all tet leaves, object space.
     pub tet_vertices: &'a [TetVertex],
     /// Constrained faces of all tet leaves.
@@ -100,7 +99,7 @@ impl<'a> ObjectView<'a> {
             leaf_vertices: &[],
             triangle_ids,
             tet_leaves: &[],
-            records: Records::None,
+            records: &[],
             tet_vertices: &[],
             tet_faces: &[],
             hull_faces: &[],

@@ -46,7 +46,7 @@ fn check_box(view: &ObjectView, row: usize, leaf: &TetLeaf) -> Result<()> {
 /// BTH-F206: tetrahedra have volume, and neighbours lie on either side of their common face.
 fn check_tetrahedra(view: &ObjectView, leaf: &TetLeaf, adjacency: &TetAdjacency<'_>) -> Result<()> {
     let rows = leaf.first_tet..leaf.first_tet + leaf.tets;
-    let stride = RecordKind::from_code(view.header.record).map_or(0, RecordKind::stride) as u64;
+    let stride = size_of::<Link32>() as u64;
     // One exact sign per tetrahedron, of its vertices in ascending order. On which side of a face
     // the opposite vertex lies follows from the parity of moving that vertex to the end.
     let signs: Vec<Ordering> = rows

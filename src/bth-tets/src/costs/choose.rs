@@ -9,7 +9,6 @@ use super::top_down;
 use crate::marks::Marks;
 use bth_bvh::BinaryBvh;
 use bth_bvh::sampling::KnownRays;
-use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use bth_import::error::{Error, Result};
 use bth_import::monitor::Monitor;
@@ -23,7 +22,6 @@ pub fn choose(
     bvh: &BinaryBvh,
     marks: &Marks,
     options: &CostOptions,
-    record: RecordKind,
     monitor: &dyn Monitor,
 ) -> Result<(Choice, CostReport)> {
     monitor.stage("costs", None);
@@ -31,7 +29,7 @@ pub fn choose(
         let message = format!("{} marks for {} nodes", marks.suitable.len(), bvh.nodes.len());
         return Err(Error::Internal { code: "BTH-X030", message });
     }
-    let prices = Prices::new(options, record);
+    let prices = Prices::new(options);
     let (mut choice, cost_bvh, mut cost_with_tets) = match &options.select {
         Select::Paper => top_down::choose(bvh, marks, options, &prices, monitor)?,
         Select::Best => best(mesh, bvh, marks, options, &prices, monitor)?,
@@ -68,11 +66,10 @@ pub fn choose_of_all(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     options: &CostOptions,
-    record: RecordKind,
     monitor: &dyn Monitor,
 ) -> Result<(Choice, CostReport)> {
     let all = Marks { suitable: vec![true; bvh.nodes.len()] };
-    choose(mesh, bvh, &all, options, record, monitor)
+    choose(mesh, bvh, &all, options, monitor)
 }
 
 /// The choice of max gain, with the cost of a ray before and after.

@@ -127,8 +127,7 @@ impl Sampled {
                 let Ok(k) = nodes.binary_search(&at) else { continue };
                 let node = &bvh.nodes[at as usize];
                 let share = if ray.tmax.is_finite() { SHORT_STEPS } else { 1.0 };
-                let mut time =
-                    prices.walk(node.count, share * steps(Start::Surface, k), hits(traced, node));
+                let mut time = prices.walk(node.count, share * steps(Start::Surface, k), hits(traced, node));
                 if at != 0 && leaves(ray, traced, node) {
                     time += bvh_time;
                 }

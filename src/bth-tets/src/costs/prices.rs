@@ -1,8 +1,8 @@
 //! Costs of rays through a tetrahedralization, by its size.
 
 use super::profile::BvhCosts;
-use super::{CostOptions, Start, Walk};
-use bth_format::layout::{RecordKind, TetVertex};
+use super::{CostOptions, Start};
+use bth_format::layout::{Link32, TetVertex};
 
 /// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on
 /// scans.
@@ -15,17 +15,14 @@ pub(super) const LINES_THAT_HIT: f64 = 0.52;
 /// Prices under the options.
 pub(super) struct Prices<'a> {
     options: &'a CostOptions,
-    costs: &'a Walk,
-    record: RecordKind,
     /// Factor on the costs of tetrahedra.
     scale: f64,
 }
 
 impl<'a> Prices<'a> {
-    pub(super) fn new(options: &'a CostOptions, record: RecordKind) -> Self {
-        let costs = options.profile.record(record);
-        let scale = options.c_tet.map_or(1.0, |c| c / costs.step[0].max(f64::MIN_POSITIVE));
-        Prices { options, costs, record, scale }
+    pub(super) fn new(options: &'a CostOptions) -> Self {
+        let step = options.profile.tets.step[0];
+        Prices { options, scale: options.c_tet.map_or(1.0, |c| c / step.max(f64::MIN_POSITIVE)) }
     }
 
     /// Costs of the BVH.
@@ -36,14 +33,15 @@ impl<'a> Prices<'a> {
     /// Bytes that walks read: the records and the vertices.
     fn walked(&self, triangles: u32) -> f64 {
         f64::from(triangles)
-            * (TETS_PER_TRIANGLE * self.record.stride() as f64
+            * (TETS_PER_TRIANGLE * size_of::<Link32>() as f64
                 + VERTICES_PER_TRIANGLE * size_of::<TetVertex>() as f64)
     }
 
-    /// Nanoseconds of a ray through the node's tetrahedra; `hits` is the share of such rays that end
-    /// at a triangle.
+    /// Nanoseconds of a ray through the node's tetrahedra. The share `hits` of such rays ends at a
+    /// triangle.
     pub(super) fn walk(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
-        self.scale * self.costs.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
+        let profile = &self.options.profile;
+        self.scale * profile.tets.cost(steps, hits, self.walked(triangles), profile.bytes)
     }
 
     /// Steps of the node's tetrahedralization, estimated.

@@ -13,7 +13,6 @@ use bth_bvh::BinaryBvh;
 use bth_bvh::sampling::walk;
 use bth_bvh::sampling::{KnownRays, SampleRay, from_surface, outside};
 use bth_bvh::vectors::{corners, double_area};
-use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use bth_import::error::Result;
 use bth_import::monitor::Monitor;
@@ -63,14 +62,13 @@ pub fn probe(
     bvh: &BinaryBvh,
     built: Vec<Leaf>,
     options: &CostOptions,
-    record: RecordKind,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Leaf>, Option<ProbeReport>)> {
     if options.probe == Probe::Off || options.select != Select::Best || built.is_empty() {
         return Ok((built, None));
     }
     monitor.stage("probe", Some(built.len() as u64));
-    let prices = Prices::new(options, record);
+    let prices = Prices::new(options);
     let known = options.rays.as_deref();
     let weights = known.map_or(options.optimize_for.weights(), KnownRays::shares);
     let all = super::gains::sample(mesh, bvh, options);

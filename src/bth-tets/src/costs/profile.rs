@@ -1,8 +1,6 @@
 //! The costs of tracing, measured on one machine with AVX-512: the constants of the cost model.
 
-use bth_format::layout::RecordKind;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// Times on one thread, nanoseconds a ray. Rays through the BVH are in batches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,8 +12,8 @@ pub struct Profile {
     pub isa: String,
     /// The BVH.
     pub bvh: BvhCosts,
-    /// Walks through tetrahedra, one ray after the other, by name of the record.
-    pub tets: BTreeMap<String, Walk>,
+    /// Walks through tetrahedra, one ray after the other.
+    pub tets: Walk,
     /// Sizes in bytes of the tetrahedra that the two costs of a step were measured on.
     pub bytes: [f64; 2],
 }
@@ -67,11 +65,6 @@ impl Default for Profile {
 }
 
 impl Profile {
-    /// Costs of a record.
-    pub fn record(&self, kind: RecordKind) -> &Walk {
-        self.tets.get(kind.name()).or_else(|| self.tets.values().next()).expect("a test finds each record")
-    }
-
     /// BLAKE3 of the numbers, hexadecimal; the only part of a profile that compiled files contain.
     pub fn hash(&self) -> String {
         let text = serde_json::to_string(self).expect("numbers and names");
@@ -84,9 +77,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_profile_has_all_records_and_two_sizes() {
+    fn the_profile_has_two_sizes() {
         let profile = Profile::default();
-        assert!(RecordKind::ALL.iter().all(|kind| profile.tets.contains_key(kind.name())));
         assert!(profile.bytes[0] >= 1.0 && profile.bytes[1] >= 2.0 * profile.bytes[0]);
     }
 

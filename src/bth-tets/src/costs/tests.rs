@@ -7,18 +7,15 @@ use crate::marks::Marks;
 use crate::{Behind, TetMesh};
 use bth_bvh::BinaryBvh;
 use bth_bvh::sampling::{KnownRays, SampleRay, from_surface, outside, walk};
-use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use bth_import::monitor::Silent;
-
-const STORED: RecordKind = RecordKind::Link32;
 
 fn paper() -> CostOptions {
     CostOptions { select: Select::Paper, minimum_gain: 0.0, ..CostOptions::default() }
 }
 
 fn chosen(bvh: &BinaryBvh, marks: &Marks, options: &CostOptions) -> (Choice, CostReport) {
-    choose(&Mesh::default(), bvh, marks, options, STORED, &Silent).unwrap()
+    choose(&Mesh::default(), bvh, marks, options, &Silent).unwrap()
 }
 
 /// The cost after the surface area heuristic, and the sum of depths, by plain recursion.
@@ -42,7 +39,7 @@ fn by_recursion(bvh: &BinaryBvh, marks: &Marks, i: usize, options: &CostOptions,
     let depth = f64::from(depths) / f64::from(node.count);
     let steps = options.estimator.steps(Start::Outside, node.count, depth);
     // The tetrahedra fit the caches, so the first cost of a step applies.
-    let walk = options.profile.record(RecordKind::Link32);
+    let walk = &options.profile.tets;
     if marks.suitable[i]
         && node.count <= options.maximum_triangles
         && walk.cost(steps, 0.52, 0.0, options.profile.bytes) < sah
@@ -65,8 +62,7 @@ fn the_papers_rule_chooses_what_its_recursion_chooses() {
                 CostOptions { estimator, minimum_triangles: 8, maximum_triangles: 200, ..paper() };
             options.profile.bvh.outside = 3.4;
             let c_tet = 0.5 + (seed % 7) as f64 * 0.2;
-            let costs = options.profile.tets.get_mut("link32").unwrap();
-            *costs = Walk { entry: 6.0, hit: 0.0, step: [c_tet, 2.0 * c_tet] };
+            options.profile.tets = Walk { entry: 6.0, hit: 0.0, step: [c_tet, 2.0 * c_tet] };
             let (choice, report) = chosen(&bvh, &marks, &options);
             let mut expected = Vec::new();
             by_recursion(&bvh, &marks, 0, &options, &mut expected);
@@ -110,7 +106,7 @@ fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
         let (choice, _) = chosen(&BinaryBvh::default(), &Marks::default(), &options);
         assert!(choice.chosen.is_empty() && choice.verdicts.is_empty());
         let bvh = tree(1, 9);
-        let error = choose(&Mesh::default(), &bvh, &Marks::default(), &options, STORED, &Silent).unwrap_err();
+        let error = choose(&Mesh::default(), &bvh, &Marks::default(), &options, &Silent).unwrap_err();
         assert!(error.to_string().contains("BTH-X030"));
     }
 }
@@ -156,7 +152,7 @@ fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
     let (mesh, bvh, marks) = blob();
     let choice = |c_tet: f64, options: CostOptions| {
         let options = CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, ..options };
-        choose(&mesh, &bvh, &marks, &options, STORED, &Silent).unwrap()
+        choose(&mesh, &bvh, &marks, &options, &Silent).unwrap()
     };
     let (cheap, report) = choice(1e-3, CostOptions::default());
     assert_eq!(cheap.chosen, [0]);
@@ -175,7 +171,7 @@ fn rays_of_a_scene_decide_which_nodes_count() {
         let rays = Some(std::sync::Arc::new(rays));
         let options =
             CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, rays, ..CostOptions::default() };
-        choose(&mesh, &bvh, &marks, &options, STORED, &Silent).unwrap().0.chosen
+        choose(&mesh, &bvh, &marks, &options, &Silent).unwrap().0.chosen
     };
     assert!(nodes(KnownRays::default()).is_empty());
     // Rays that all start below one child of the root and end there.
@@ -198,11 +194,11 @@ fn what_all_nodes_cannot_gain_no_marks_can() {
         let options =
             CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, minimum_gain, ..CostOptions::default() };
         assert!(options.more_suitable_gain_more());
-        let (of_all, report) = choose_of_all(&mesh, &bvh, &options, STORED, &Silent).unwrap();
+        let (of_all, report) = choose_of_all(&mesh, &bvh, &options, &Silent).unwrap();
         let gain = report.cost_bvh - report.cost_with_tets;
         for row in [0, 1, 100, bvh.order.len() as u32 / 2, bvh.order.len() as u32 - 300] {
             let marks = marks_beyond(&bvh, row);
-            let (choice, report) = choose(&mesh, &bvh, &marks, &options, STORED, &Silent).unwrap();
+            let (choice, report) = choose(&mesh, &bvh, &marks, &options, &Silent).unwrap();
             assert!(
                 report.cost_bvh - report.cost_with_tets <= gain + 1e-9 * report.cost_bvh,
                 "{c_tet}, {row}"

@@ -1,8 +1,6 @@
-//! The file's sections for tet leaves: rows numbered across all leaves, links in the chosen record.
+//! The file's sections for tet leaves: rows numbered across all leaves.
 
-use bth_format::layout::{
-    FACE_BIT, HullFace, Link, Link32, NONE, RecordKind, Tet16, TetFace, TetLeaf, TetVertex,
-};
+use bth_format::layout::{FACE_BIT, HullFace, Link, Link32, NONE, TetFace, TetLeaf, TetVertex};
 use zerocopy::IntoBytes;
 
 use super::{Behind, TetMesh};
@@ -31,10 +29,10 @@ pub struct Encoded {
 ///
 /// # Panics
 /// When a face names a triangle beyond `triangles`.
-pub fn encode(meshes: &[TetMesh], kind: RecordKind, triangles: usize) -> Encoded {
+pub fn encode(meshes: &[TetMesh], triangles: usize) -> Encoded {
     let mut to = Encoded { face_of_triangle: vec![NONE; triangles], ..Encoded::default() };
     let count: usize = meshes.iter().map(|m| m.tets.len()).sum();
-    to.tets.reserve_exact(count * kind.stride());
+    to.tets.reserve_exact(count * size_of::<Link32>());
     for mesh in meshes {
         let base = Base { tet: to.tet_count, vertex: to.vertices.len() as u32, face: to.faces.len() as u32 };
         let first_hull = to.hulls.len() as u32;
@@ -53,8 +51,8 @@ pub fn encode(meshes: &[TetMesh], kind: RecordKind, triangles: usize) -> Encoded
                 let vertex = inwards(mesh, *tet, k).map(|v| base.vertex + v);
                 HullFace { vertex, tet: base.tet + t as u32, opposite: base.vertex + tet[k] }
             }));
-            let links = std::array::from_fn(|k| base.link(mesh, t, k));
-            push_record(&mut to.tets, kind, tet.map(|v| base.vertex + v), links);
+            let link = std::array::from_fn(|k| base.link(mesh, t, k));
+            to.tets.extend_from_slice(Link32 { link }.as_bytes());
         }
         to.tet_count += mesh.tets.len() as u32;
         to.leaves.push(TetLeaf {
@@ -73,18 +71,6 @@ pub fn encode(meshes: &[TetMesh], kind: RecordKind, triangles: usize) -> Encoded
         });
     }
     to
-}
-
-/// Bytes that a tetrahedralization adds to the sections, without the map from triangles to faces,
-/// which has a row for each triangle of the source.
-pub fn encoded_bytes(mesh: &TetMesh, kind: RecordKind) -> u64 {
-    let hulls = mesh.behind.iter().flatten().filter(|behind| **behind == Behind::Hull).count();
-    let bytes = mesh.tets.len() * kind.stride()
-        + mesh.vertices.len() * size_of::<TetVertex>()
-        + mesh.faces.len() * size_of::<TetFace>()
-        + hulls * size_of::<HullFace>()
-        + size_of::<TetLeaf>();
-    bytes as u64
 }
 
 /// First rows of a leaf in each section.
@@ -124,16 +110,5 @@ fn inwards(mesh: &TetMesh, tet: [u32; 4], k: usize) -> [u32; 3] {
         [a, b, c]
     } else {
         [a, c, b]
-    }
-}
-
-fn push_record(to: &mut Vec<u8>, kind: RecordKind, vertex: [u32; 4], link: [Link; 4]) {
-    match kind {
-        RecordKind::Link32 => to.extend_from_slice(Link32 { link }.as_bytes()),
-        RecordKind::Tet16 => {
-            let xor = vertex.iter().fold(0, |x, v| x ^ v);
-            let next = [0, 1, 2].map(|k| link[k].next ^ link[3].next);
-            to.extend_from_slice(Tet16 { xor, next }.as_bytes());
-        }
     }
 }

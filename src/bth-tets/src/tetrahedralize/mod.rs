@@ -21,7 +21,7 @@ mod report;
 mod worker;
 
 pub use build::{build, build_through};
-pub use encode::{Encoded, encode, encoded_bytes};
+pub use encode::{Encoded, encode};
 pub use gather::NodeInput;
 pub use node::{NodeJob, NodeResult, NodeRunner, TimedNodes};
 pub use options::TetOptions;

@@ -1,6 +1,6 @@
 //! Records decode to what was encoded.
 
-use bth_format::layout::{FACE_BIT, Link32, NONE, RecordKind, Tet16};
+use bth_format::layout::{FACE_BIT, Link32, NONE};
 use bth_import::Silent;
 use bth_tets::{Behind, Encoded, Face, TetMesh, build, encode};
 use zerocopy::FromBytes;
@@ -34,8 +34,8 @@ fn five(shift: f32, triangle: u32) -> TetMesh {
 }
 
 /// Decodes every record by the specification's rules and compares it with the mesh.
-fn assert_decodes(meshes: &[TetMesh], kind: RecordKind, encoded: &Encoded) {
-    assert_eq!(encoded.tets.len(), encoded.tet_count as usize * kind.stride());
+fn assert_decodes(meshes: &[TetMesh], encoded: &Encoded) {
+    assert_eq!(encoded.tets.len(), encoded.tet_count as usize * size_of::<Link32>());
     assert_eq!(encoded.leaves.len(), meshes.len());
     for (leaf, mesh) in encoded.leaves.iter().zip(meshes) {
         assert_eq!((leaf.lower, leaf.upper), (mesh.lower, mesh.upper));
@@ -62,33 +62,22 @@ fn assert_decodes(meshes: &[TetMesh], kind: RecordKind, encoded: &Encoded) {
             }
         }
         for (t, tet) in mesh.tets.iter().enumerate() {
-            let bytes = &encoded.tets[(leaf.first_tet as usize + t) * kind.stride()..][..kind.stride()];
-            let corner = tet.map(|v| v + leaf.first_vertex);
-            let xor = corner.iter().fold(0, |x, v| x ^ v);
-            let next = match kind {
-                RecordKind::Link32 => Link32::read_from_bytes(bytes).unwrap().link.map(|l| l.next),
-                RecordKind::Tet16 => {
-                    let record = Tet16::read_from_bytes(bytes).unwrap();
-                    assert_eq!(record.xor, xor);
-                    // The other links follow from any one of them; here from the fourth.
-                    let last = code(mesh.behind[t][3], leaf.first_tet, leaf.first_face);
-                    [record.next[0] ^ last, record.next[1] ^ last, record.next[2] ^ last, last]
-                }
-            };
+            let (records, rest) = encoded.tets.as_chunks::<{ size_of::<Link32>() }>();
+            assert!(rest.is_empty());
+            let record = Link32::read_from_bytes(&records[leaf.first_tet as usize + t]).unwrap();
+            let next = record.link.map(|l| l.next);
             assert_eq!(next, mesh.behind[t].map(|b| code(b, leaf.first_tet, leaf.first_face)));
-            if kind == RecordKind::Link32 {
-                for (k, link) in Link32::read_from_bytes(bytes).unwrap().link.into_iter().enumerate() {
-                    let beyond = match mesh.behind[t][k] {
-                        Behind::Hull => None,
-                        Behind::Tet(n) => Some(n),
-                        Behind::Face(f) => mesh.faces[f as usize].tet.into_iter().find(|&n| n != t as u32),
-                    };
-                    let apex = beyond.map(|n| {
-                        let face: Vec<u32> = (0..4).filter(|&i| i != k).map(|i| tet[i]).collect();
-                        mesh.tets[n as usize].into_iter().find(|v| !face.contains(v)).unwrap()
-                    });
-                    assert_eq!(link.opposite, apex.map_or(NONE, |v| v + leaf.first_vertex));
-                }
+            for (k, link) in record.link.into_iter().enumerate() {
+                let beyond = match mesh.behind[t][k] {
+                    Behind::Hull => None,
+                    Behind::Tet(n) => Some(n),
+                    Behind::Face(f) => mesh.faces[f as usize].tet.into_iter().find(|&n| n != t as u32),
+                };
+                let apex = beyond.map(|n| {
+                    let face: Vec<u32> = (0..4).filter(|&i| i != k).map(|i| tet[i]).collect();
+                    mesh.tets[n as usize].into_iter().find(|v| !face.contains(v)).unwrap()
+                });
+                assert_eq!(link.opposite, apex.map_or(NONE, |v| v + leaf.first_vertex));
             }
         }
     }
@@ -103,20 +92,18 @@ fn code(behind: Behind, first_tet: u32, first_face: u32) -> u32 {
 }
 
 #[test]
-fn every_record_decodes_to_what_was_encoded() {
+fn records_decode_to_what_was_encoded() {
     let meshes = [five(0.0, 2), five(4.0, 0)];
-    for kind in RecordKind::ALL {
-        let encoded = encode(&meshes, kind, 4);
-        assert_eq!(encoded.face_of_triangle, [1, NONE, 0, NONE]);
-        assert_eq!((encoded.leaves[1].first_tet, encoded.leaves[1].first_vertex), (5, 8));
-        assert_eq!(encoded.leaves[1].first_face, 1);
-        assert_decodes(&meshes, kind, &encoded);
-    }
+    let encoded = encode(&meshes, 4);
+    assert_eq!(encoded.face_of_triangle, [1, NONE, 0, NONE]);
+    assert_eq!((encoded.leaves[1].first_tet, encoded.leaves[1].first_vertex), (5, 8));
+    assert_eq!(encoded.leaves[1].first_face, 1);
+    assert_decodes(&meshes, &encoded);
 }
 
 #[test]
 fn nothing_encodes_to_nothing() {
-    let encoded = encode(&[], RecordKind::Link32, 3);
+    let encoded = encode(&[], 3);
     assert_eq!(encoded.face_of_triangle, [NONE; 3]);
     assert!(encoded.leaves.is_empty() && encoded.tets.is_empty() && encoded.hulls.is_empty());
 }
@@ -129,17 +116,15 @@ fn records_of_a_real_tetrahedralization_decode() {
     let (built, _) = build(&mesh, &bvh, &nodes_of_at_most(&bvh, 300), &options, &Silent).unwrap();
     let meshes: Vec<TetMesh> = built.into_iter().map(|(_, m)| m).collect();
     assert!(meshes.len() > 1);
-    for kind in RecordKind::ALL {
-        let encoded = encode(&meshes, kind, mesh.triangles.len());
-        assert_decodes(&meshes, kind, &encoded);
-        assert!(encoded.face_of_triangle.iter().all(|&row| row != NONE));
-        for hull in &encoded.hulls {
-            let p = |v: u32| encoded.vertices[v as usize].position.map(f64::from);
-            let [a, b, c] = hull.vertex.map(p);
-            let d = p(hull.opposite);
-            let [e, f, g] = [b, c, d].map(|x| [0, 1, 2].map(|k| x[k] - a[k]));
-            let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
-            assert!(n[0] * g[0] + n[1] * g[1] + n[2] * g[2] > 0.0, "a hull face looks outwards");
-        }
+    let encoded = encode(&meshes, mesh.triangles.len());
+    assert_decodes(&meshes, &encoded);
+    assert!(encoded.face_of_triangle.iter().all(|&row| row != NONE));
+    for hull in &encoded.hulls {
+        let p = |v: u32| encoded.vertices[v as usize].position.map(f64::from);
+        let [a, b, c] = hull.vertex.map(p);
+        let d = p(hull.opposite);
+        let [e, f, g] = [b, c, d].map(|x| [0, 1, 2].map(|k| x[k] - a[k]));
+        let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+        assert!(n[0] * g[0] + n[1] * g[1] + n[2] * g[2] > 0.0, "a hull face looks outwards");
     }
 }

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use bth_compile::Monitor;
 use bth_compile::coordinates::{CoordinateOptions, MaxError};
 use bth_compile::pipeline::CompileOptions;
-use bth_format::layout::{GridBits, RecordKind};
+use bth_format::layout::GridBits;
 use bth_import::Keep;
 use clap::Args as Group;
 use std::path::PathBuf;
@@ -75,13 +75,9 @@ pub(crate) struct Compile {
     /// fails if a vertex would move more.
     #[arg(long, help_heading = SMALLER, value_name = "DISTANCE", value_parser = str::parse::<MaxError>)]
     pub(crate) max_error: Option<MaxError>,
-    /// Make the smallest tetrahedralizations: short for `--set record=tet16`. Takes 100 bytes a
-    /// triangle where all triangles are in tetrahedra.
-    #[arg(long, help_heading = SMALLER)]
-    pub(crate) compact: bool,
     /// Keep what new positions at run time need: see docs/deforming.md. All vertices keep the order
     /// of the source. The object is a BVH.
-    #[arg(long, help_heading = DEFORMING, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact", "rigid_parts"])]
+    #[arg(long, help_heading = DEFORMING, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "rigid_parts"])]
     pub(crate) deformable: bool,
     #[command(flatten)]
     pub(crate) selection: Selection,
@@ -126,7 +122,6 @@ impl Compile {
             polygons: self.polygons.into(),
             positions: self.positions.into(),
             alpha: self.alpha.into(),
-            record: if self.compact { RecordKind::Tet16 } else { RecordKind::Link32 },
             coordinates: self.coordinates(),
             free: bth_compile::free::FreeOptions { keep: self.free_directions.into(), ..Default::default() },
             geometry: !self.no_geometry,

@@ -20,7 +20,7 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
         let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;
         let (tree, _) = pipeline::build_tree(&mesh, &options, &progress)?;
         let (marks, _) = marks::mark(&mesh, &tree, &progress)?;
-        let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, options.record, &progress)?;
+        let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, &progress)?;
         Ok((mesh, chosen))
     })??;
     drop(progress);

@@ -12,7 +12,7 @@ use bth_format::groups::Groups;
 use bth_format::layout::kind;
 use bth_format::layout::{
     FREE_BINS, FREE_SECTORS, FreeBins, FreeSectors, IDENTIFIER, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE,
-    RecordKind, SectionEntry,
+    SectionEntry,
 };
 use bth_format::object::ObjectView;
 use bth_format::{File, SceneView};
@@ -63,10 +63,6 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-fn record(view: &ObjectView<'_>) -> &'static str {
-    RecordKind::from_code(view.header.record).map_or("none", RecordKind::name)
-}
-
 /// The provenance record, as JSON if it is JSON, else as text.
 fn provenance(file: &File) -> Value {
     file.provenance().map_or(Value::Null, |text| serde_json::from_str(text).unwrap_or_else(|_| text.into()))
@@ -85,7 +81,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
         Ok(json!({"lower": h.lower, "upper": h.upper, "triangles": h.triangles, "dropped": h.dropped,
             "depth": h.depth, "coordinates": view.grid.map_or(32, |grid| grid.bits as u32),
             "displacement": h.displacement, "positions": if view.exact.is_empty() { "f32" } else { "f64" },
-            "anchor": view.anchor, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
+            "anchor": view.anchor, "tet_leaves": view.tet_leaves.len(),
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
                 "transparent": h.shares[1], "unknown": h.shares[2]})),
@@ -306,7 +302,6 @@ fn object_text(file: &File, object: u32) -> Result<String, Failure> {
         facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
         facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
         facts.row(["tetrahedra", &count(view.records.len() as u64)]);
-        facts.row(["record", record(&view)]);
     }
     let own = |e: &&SectionEntry| e.object == object && file.is_traced(e);
     let traced: u64 = file.sections().map(|s| s.entry).filter(own).map(|e| e.length).sum();

@@ -19,10 +19,9 @@ use crate::report::{Head, Report, Subject};
 use crate::structures::{self, Use};
 use crate::tracer::Tracer;
 use anyhow::Result;
-use bth_compile::costs::{self, Profile, Select, Walk};
+use bth_compile::costs::{self, BvhCosts, Profile, Select, Walk};
 use bth_compile::pipeline::{self, Structure};
 use bth_compile::{Silent, bvh, marks, tets};
-use bth_format::layout::RecordKind;
 use clap::Args;
 use serde_json::json;
 use std::time::Instant;
@@ -58,20 +57,11 @@ const FEWEST_TRIANGLES: u32 = 64;
 
 /// Costs of the scalar traversals in nanoseconds, which the paper's rule compares: measured on
 /// camera rays to blobs of 6,000 and 150,000 faces (Intel Xeon, family 6, model 207, 2026-11-28).
-fn scalar_profile() -> Profile {
-    let mut profile = Profile { isa: "scalar".to_owned(), bytes: [648e3, 15.6e6], ..Profile::default() };
-    (profile.bvh.ray, profile.bvh.outside) = (0.0, 12.1);
-    for (stored, step) in [(TET32, [23.6, 30.5]), (TET20, [24.0, 29.1])] {
-        let walk = Walk { entry: 77.0, hit: 0.0, step };
-        let record = profile_record(stored).name().to_owned();
-        profile.tets.insert(record, walk);
-    }
-    profile
-}
-
-/// The row of a profile that holds the costs of Tet32 or Tet20: our record of about this size.
-fn profile_record(stored: usize) -> RecordKind {
-    if stored == TET32 { RecordKind::Link32 } else { RecordKind::Tet16 }
+fn scalar_profile(stored: usize) -> Profile {
+    let step = if stored == TET32 { [23.6, 30.5] } else { [24.0, 29.1] };
+    let tets = Walk { entry: 77.0, hit: 0.0, step };
+    let bvh = BvhCosts { ray: 0.0, outside: 12.1, ..Profile::default().bvh };
+    Profile { isa: "scalar".to_owned(), bytes: [648e3, 15.6e6], bvh, tets, ..Profile::default() }
 }
 
 /// A structure that is ready to render.
@@ -91,26 +81,25 @@ struct BuiltStructure {
 /// Measures all models.
 pub(crate) fn measure(arguments: &Paper) -> Result<Report> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
-    let profile = scalar_profile();
     let rounds = arguments.run.rounds(arguments.rounds);
     let size = if arguments.run.quick { QUICK_SIZE } else { SIZE };
     let options = json!({"pixels": size, "rounds": rounds, "quick": arguments.run.quick});
     let mut report = Report::new(Head::now("paper", isa, options), rounds, ABOUT);
     for name in &arguments.models {
-        measure_model(&Model::load(name)?, &profile, size, &mut report)?;
+        measure_model(&Model::load(name)?, size, &mut report)?;
     }
     Ok(report)
 }
 
-fn measure_model(model: &Model, profile: &Profile, size: (u32, u32), report: &mut Report) -> Result<()> {
+fn measure_model(model: &Model, size: (u32, u32), report: &mut Report) -> Result<()> {
     let name = &model.name;
     let views = Views::of(model, size)?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut built: Vec<BuiltStructure> = Vec::new();
     progress(format!("{name}: BTH32, Tet32"));
-    one.install(|| scalar::<TET32>(model, profile, &views, &mut built, report))?;
+    one.install(|| scalar::<TET32>(model, &views, &mut built, report))?;
     progress(format!("{name}: BTH20, Tet20"));
-    one.install(|| scalar::<TET20>(model, profile, &views, &mut built, report))?;
+    one.install(|| scalar::<TET20>(model, &views, &mut built, report))?;
     progress(format!("{name}: our files"));
     one.install(|| own(model, &mut built))?;
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
@@ -142,7 +131,6 @@ fn measure_model(model: &Model, profile: &Profile, size: (u32, u32), report: &mu
 /// Builds the paper's structures with tetrahedra of one record; with Tet32 also its BVH.
 fn scalar<const STORED: usize>(
     model: &Model,
-    profile: &Profile,
     views: &Views,
     built: &mut Vec<BuiltStructure>,
     report: &mut Report,
@@ -170,13 +158,12 @@ fn scalar<const STORED: usize>(
     let (marks, _) = marks::mark(mesh, &tree, &Silent)?;
     let costs = costs::CostOptions {
         select: Select::Paper,
-        profile: profile.clone(),
+        profile: scalar_profile(STORED),
         minimum_triangles: FEWEST_TRIANGLES,
         minimum_gain: 0.0,
         ..costs::CostOptions::default()
     };
-    let record = profile_record(STORED);
-    let (choice, _) = costs::choose(mesh, &tree, &marks, &costs, record, &Silent)?;
+    let (choice, _) = costs::choose(mesh, &tree, &marks, &costs, &Silent)?;
     let (leaves, _) = tets::build(mesh, &tree, &choice.chosen, &tet_options, &Silent)?;
     let mut bth = PaperTree::<STORED>::new(mesh, &tree, &leaves);
     let seconds = bvh_seconds + clock.elapsed().as_secs_f64();

@@ -1,8 +1,8 @@
 //! Wrong answers against time, for engines from package registries.
 //!
-//! `sets`, `aimed_rays` and `instances` make the queries, `exact` answers them by rational arithmetic, `engines`
-//! knows the engines and how each leaves a surface, `process` talks to those that are programs,
-//! `judge` compares, and `page` and `chart` show it.
+//! `sets`, `aimed_rays` and `instances` make the queries. `exact` answers them by rational
+//! arithmetic. `engines` knows the engines and how each leaves a surface, `process` talks to those
+//! that are programs, `judge` compares, and `page` and `chart` show it.
 
 mod aimed_rays;
 mod chart;

@@ -7,8 +7,7 @@
 //! touches, and every constrained face that the exact test can accept. Each tetrahedron is visited
 //! once, so the flood ends.
 
-use super::records::{Entered, ReadRecords};
-use super::walk::{TetWalker, WalkOutcome};
+use super::walk::{Entered, TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
 use crate::query::{Count, EitherQuery, Receiver, TriangleRef};
 use bth_format::layout::{FACE_BIT, NONE};
@@ -103,7 +102,7 @@ impl TetWalker<'_> {
         let mut stack = Pending::new();
         for face in self.hull {
             if self.touches(&face.vertex.map(|v| self.project(v))) && visited.insert(face.tet) {
-                stack.push((face.tet, Entered { face: face.vertex, apex: face.opposite, behind: NONE }));
+                stack.push((face.tet, Entered { face: face.vertex, apex: face.opposite }));
             }
         }
         while let Some((tet, entered)) = stack.pop() {
@@ -117,7 +116,7 @@ impl TetWalker<'_> {
                 if !self.touches(&projected) {
                     continue;
                 }
-                let link = self.records.link(tet, &entered, entered.face[replaced]);
+                let link = self.link(tet, &entered, entered.face[replaced]);
                 let constrained = link.next & FACE_BIT != 0 && link.next != NONE;
                 if constrained {
                     let (triangle, corners) = self.triangle(&self.faces[(link.next & !FACE_BIT) as usize]);
@@ -128,10 +127,10 @@ impl TetWalker<'_> {
                 if self.line.t_range(projected.each_ref()).0 > receiver.limit() {
                     continue;
                 }
-                if let Some((next, apex, behind)) = self.beyond(tet, link, face)
+                if let Some((next, apex)) = self.beyond(tet, link)
                     && visited.insert(next)
                 {
-                    stack.push((next, Entered { face, apex, behind }));
+                    stack.push((next, Entered { face, apex }));
                 }
             }
         }

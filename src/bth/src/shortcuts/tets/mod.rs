@@ -1,9 +1,8 @@
-//! Walks of rays through the tetrahedra of tet leaves, in either record ([`records`]).
+//! Walks of rays through the tetrahedra of tet leaves.
 //!
-//! The rest of the runtime sees a [`SpecialLeaf`](leaf::SpecialLeaf). A ray is walked in f64
-//! ([`walk`]), and where that does not decide, all tetrahedra near its line are visited ([`flood`]).
+//! The rest of the runtime sees a [`SpecialLeaf`](leaf::SpecialLeaf). [`walk`] follows a ray in
+//! f64. Where that does not decide, [`flood`] visits all tetrahedra near its line.
 
 mod flood;
 pub(super) mod leaf;
-mod records;
 mod walk;

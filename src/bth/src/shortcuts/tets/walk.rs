@@ -7,21 +7,29 @@
 //! within the bound of the rounding errors. The walk then ends, and [`TetWalker::flood`] visits
 //! every tetrahedron that the line may touch.
 
-use super::records::{Entered, ReadRecords};
 use crate::intersect::exact_ray::{WorldLines, intersect_in_world};
 use crate::intersect::line::{Line, Projected, Sign};
 use crate::intersect::start::ExactStart;
 use crate::intersect::vector::wide;
 use crate::query::double::offer_in_world;
 use crate::query::{Count, EitherQuery, TriangleRef};
-use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
-use bth_format::object::{ObjectView, Records};
+use bth_format::layout::{FACE_BIT, HullFace, Link, Link32, NONE, TetFace, TetLeaf, TetVertex};
+use bth_format::object::ObjectView;
+
+/// The face through which a walk entered a tetrahedron, and the fourth vertex of the tetrahedron.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entered {
+    /// Vertices of the entered face.
+    pub(crate) face: [u32; 3],
+    /// The fourth vertex.
+    pub(crate) apex: u32,
+}
 
 /// The data of a tet leaf that a walk reads, and the line of the ray, in object space.
 pub(crate) struct TetWalker<'a> {
     pub(crate) leaf: &'a TetLeaf,
     /// Records of all tetrahedra of the object.
-    pub(crate) records: Records<'a>,
+    pub(crate) records: &'a [Link32],
     /// Vertices of all tetrahedra of the object.
     pub(crate) vertices: &'a [TetVertex],
     /// Constrained faces of all tet leaves of the object.
@@ -134,21 +142,28 @@ impl<'a> TetWalker<'a> {
         found.is_some_and(|found| query.offer(triangle, found))
     }
 
-    /// Follows a link from the tetrahedron `from` through `face`. Returns the tetrahedron behind
-    /// the face, its fourth vertex, and the link in its record that leads back through the face;
-    /// `None` if the face belongs to the hull.
+    /// The link behind the face opposite to a vertex of an entered tetrahedron. Links are stored in
+    /// ascending order of the opposite vertex.
     #[inline(always)]
-    pub(crate) fn beyond(&self, from: u32, link: Link, face: [u32; 3]) -> Option<(u32, u32, u32)> {
+    pub(crate) fn link(&self, tet: u32, entered: &Entered, vertex: u32) -> Link {
+        let below = |v: u32| usize::from(v < vertex);
+        let rank = entered.face.iter().map(|v| below(*v)).sum::<usize>() + below(entered.apex);
+        self.records[tet as usize].link[rank & 3]
+    }
+
+    /// Follows a link from the tetrahedron `from`. Returns the tetrahedron behind the face and its
+    /// fourth vertex; `None` if the face belongs to the hull.
+    #[inline(always)]
+    pub(crate) fn beyond(&self, from: u32, link: Link) -> Option<(u32, u32)> {
         if link.next == NONE {
             return None;
         }
         if link.next & FACE_BIT != 0 {
             let constrained = &self.faces[(link.next & !FACE_BIT) as usize];
             let side = (constrained.tet[0] == from) as usize;
-            return Some((constrained.tet[side], constrained.opposite[side], link.next));
+            return Some((constrained.tet[side], constrained.opposite[side]));
         }
-        let apex = self.records.apex(link.next, face, link.opposite);
-        Some((link.next, apex, from))
+        Some((link.next, link.opposite))
     }
 
     /// Replaces the position's face by the one through which the line leaves the tetrahedron, and
@@ -164,7 +179,7 @@ impl<'a> TetWalker<'a> {
             (_, Positive, Negative) => 0,
             _ => return None,
         };
-        let link = self.records.link(position.tet, &position.entered, position.entered.face[replaced]);
+        let link = self.link(position.tet, &position.entered, position.entered.face[replaced]);
         position.entered.face[replaced] = position.entered.apex;
         position.corner[replaced] = apex;
         Some(link)
@@ -193,12 +208,9 @@ impl<'a> TetWalker<'a> {
             if nearest > query.limit() {
                 return WalkOutcome::Left;
             }
-            let Some((tet, apex, behind)) = self.beyond(position.tet, link, position.entered.face) else {
-                return WalkOutcome::Left;
-            };
+            let Some((tet, apex)) = self.beyond(position.tet, link) else { return WalkOutcome::Left };
             position.tet = tet;
             position.entered.apex = apex;
-            position.entered.behind = behind;
         }
         WalkOutcome::Uncertain
     }
@@ -219,7 +231,7 @@ impl<'a> TetWalker<'a> {
             vertex.swap(1, 2);
             corner.swap(1, 2);
         }
-        let entered = Entered { face: vertex, apex: constrained.opposite[side], behind: face | FACE_BIT };
+        let entered = Entered { face: vertex, apex: constrained.opposite[side] };
         Some(TetPosition { tet: constrained.tet[side], entered, corner })
     }
 
@@ -244,7 +256,7 @@ impl<'a> TetWalker<'a> {
             if sides.contains(&Sign::Uncertain) {
                 return Err(WalkOutcome::Uncertain);
             }
-            let entered = Entered { face: face.vertex, apex: face.opposite, behind: NONE };
+            let entered = Entered { face: face.vertex, apex: face.opposite };
             position = Ok(TetPosition { tet: face.tet, entered, corner });
         }
         position

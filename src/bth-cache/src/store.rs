@@ -217,7 +217,7 @@ impl Store {
     /// not be in memory, but for a shared store.
     ///
     /// # Errors
-    /// Those of `write`, or when it cannot be written; the store is then as it was.
+    /// Errors of `write`, or when it cannot be written; the store is then as it was.
     pub fn put_written(
         &self,
         key: &Key,

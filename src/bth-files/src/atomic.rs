@@ -21,7 +21,7 @@ const LONGEST: usize = 200;
 /// Writes a file that is whole or absent, replacing one of that name; it is on the disk on return.
 ///
 /// # Errors
-/// Those of the system and of `write`; the target is then as it was.
+/// Errors of the system and of `write`; the target is then as it was.
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -71,7 +71,7 @@ pub fn replace(
 /// readers must check it. Whoever may write to the folder may read it.
 ///
 /// # Errors
-/// Those of the system.
+/// Errors of the system.
 pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
     write_once_by(path, &|out| out.write_all(bytes))
 }
@@ -79,7 +79,7 @@ pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
 /// As [`write_once`], with what `write` writes.
 ///
 /// # Errors
-/// Those of the system and of `write`.
+/// Errors of the system and of `write`.
 pub fn write_once_by(
     path: &Path,
     write: &dyn Fn(&mut dyn Write) -> std::io::Result<()>,
@@ -110,7 +110,7 @@ pub fn write_once_by(
 /// A file without a name in a folder, to write to and to read from. It is gone when it is closed.
 ///
 /// # Errors
-/// Those of the system.
+/// Errors of the system.
 pub fn nameless(folder: &Path) -> std::io::Result<File> {
     create(folder, &prefix_of(OsStr::new("bth")), 0o600).map(|(file, _)| file)
 }
@@ -119,7 +119,7 @@ pub fn nameless(folder: &Path) -> std::io::Result<File> {
 /// write to those that are made in it.
 ///
 /// # Errors
-/// Those of the system.
+/// Errors of the system.
 pub fn create_folders(root: &Path, path: &Path) -> std::io::Result<()> {
     match std::fs::create_dir(path) {
         Ok(()) => {}

@@ -8,7 +8,7 @@ use std::path::Path;
 /// that is opened waits for a writer, and a device may have no end.
 ///
 /// # Errors
-/// Those of the system; `IsADirectory` for folders, `NotSeekable` for pipes, sockets and devices.
+/// Errors of the system; `IsADirectory` for folders, `NotSeekable` for pipes, sockets and devices.
 pub fn regular_file(path: &Path) -> Result<Metadata> {
     match std::fs::metadata(path)? {
         found if found.is_file() => Ok(found),

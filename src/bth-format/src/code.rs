@@ -82,7 +82,7 @@ codes! {
     TetFace "F126" "A constrained face names three distinct vertices of its leaf and the tetrahedron and fourth vertex on either side; both refer to it, and no other tetrahedron does."
     Link "F127" "A link is NONE, another tetrahedron of the same leaf or a constrained face of the same leaf."
     Neighbour "F128" "Neighbours share three vertices and refer to each other."
-    TetRecord "F129" "Opposite vertices of links are those of the neighbours."
+    TetRecord "F129" "The opposite vertex of a link is the vertex of the neighbour off the shared face."
     Unreached "F130" "Every tetrahedron of a leaf is reached from its first hull face."
     TriangleFaces "F131" "TRIANGLE_FACES is empty without tet leaves; else it maps each triangle that is a constrained face to that face, and others to NONE."
     SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows where the object has both."

@@ -110,7 +110,7 @@ impl<'a> CompileInput<'a> {
 /// Compiles a model from its path, or from a [`TriangleMesh`].
 ///
 /// # Errors
-/// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
+/// Errors of the stages: a source that cannot be used or read, a limit of the format, cancellation.
 /// For triangles in memory `BTH-I005` for an index that is not a row of the positions, and
 /// `BTH-I004` for a corner that is not finite, both with the row of the triangle.
 pub fn compile<'a>(

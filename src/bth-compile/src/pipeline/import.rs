@@ -21,7 +21,7 @@ impl Import<'_> {
     /// The mesh, without the hashes of its summary.
     ///
     /// # Errors
-    /// Those of the import; `BTH-O002` when a file has changed since it was hashed.
+    /// Errors of the import; `BTH-O002` when a file has changed since it was hashed.
     pub(crate) fn read(&self, monitor: &dyn Monitor) -> Result<(Mesh, mesh::Report)> {
         let Model { path, digest } = *self.model;
         let (mut mesh, mut report) = mesh::import(path, self.wanted, monitor)?;

@@ -22,7 +22,7 @@ use std::path::Path;
 /// Compiles a scene; paths of the manifest count from `folder`, `name` names the scene in messages.
 ///
 /// # Errors
-/// Those of the objects; `BTH-I050` when its first frame cannot be shown.
+/// Errors of the objects; `BTH-I050` when its first frame cannot be shown.
 pub fn compile(
     manifest: &Manifest,
     folder: &Path,

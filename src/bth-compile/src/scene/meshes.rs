@@ -31,7 +31,7 @@ struct Imported {
 /// The meshes of a file that are used, in order. Those that the cache lacks are imported together.
 ///
 /// # Errors
-/// Those of the import.
+/// Errors of the import.
 pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<SourceMesh>> {
     // A mesh in memory is not kept: reading it from the cache would take longer than its import.
     let in_cache = |part| match file.in_memory {
@@ -73,7 +73,7 @@ impl SourceMesh {
     /// The mesh itself.
     ///
     /// # Errors
-    /// Those of the import, when the mesh has been evicted from the cache.
+    /// Errors of the import, when the mesh has been evicted from the cache.
     pub(super) fn take(&mut self, file: &File<'_>, context: &Context<'_>) -> Result<Mesh> {
         if let Some(mesh) = self.mesh.take() {
             return Ok(mesh);

@@ -78,7 +78,7 @@ impl Moving {
     /// Reads the mesh with its frames. `digest` is what [`Self::digest`] gave before.
     ///
     /// # Errors
-    /// Those of the import; `BTH-O002` when a file has changed since it was hashed.
+    /// Errors of the import; `BTH-O002` when a file has changed since it was hashed.
     pub(super) fn import(
         &self,
         digest: &SourceDigest,

@@ -72,7 +72,7 @@ impl ObjectSections {
     /// Moves the bytes of sections elsewhere, but for those that are read again.
     ///
     /// # Errors
-    /// Those of `to`.
+    /// Errors of `to`.
     pub(super) fn move_to(&mut self, to: &mut dyn FnMut(&[u8]) -> Result<Bytes<'static>>) -> Result<()> {
         for section in &mut self.sections {
             let Some(bytes) = section.bytes.in_memory() else { continue };

@@ -160,7 +160,7 @@ impl<'a> FileBuilder<'a> {
     /// Passes on the bytes of the file, in pieces. Sections on disk are read.
     ///
     /// # Errors
-    /// Those of `take`, and of files that cannot be read again or have changed.
+    /// Errors of `take`, and of files that cannot be read again or have changed.
     pub(crate) fn write_to(&self, take: &mut dyn FnMut(&[u8]) -> std::io::Result<()>) -> std::io::Result<()> {
         let entries = self.entries();
         take(self.header(&entries).as_bytes())?;
@@ -178,7 +178,7 @@ impl<'a> FileBuilder<'a> {
     /// where which bytes of the sections in memory are to be copied.
     ///
     /// # Errors
-    /// Those of files that cannot be read again or have changed.
+    /// Errors of files that cannot be read again or have changed.
     pub(super) fn copies<'b>(
         &'b self,
         bytes: &'b mut [u8],
@@ -217,7 +217,7 @@ impl<'a> FileBuilder<'a> {
     /// Moves the bytes of large sections elsewhere, where `to` takes them.
     ///
     /// # Errors
-    /// Those of `to`.
+    /// Errors of `to`.
     pub(crate) fn move_large(
         &mut self,
         to: &mut dyn FnMut(&[u8]) -> Result<Option<Bytes<'static>>>,

@@ -67,7 +67,7 @@ impl Content {
     /// Writes the content. What is on disk is copied from there.
     ///
     /// # Errors
-    /// Those of the writer, and of files that cannot be read again or have changed.
+    /// Errors of the writer, and of files that cannot be read again or have changed.
     pub fn write_to(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
         match &self.0 {
             Parts::Bytes(bytes) => out.write_all(bytes),

@@ -96,7 +96,7 @@ impl DiskFile {
     /// Appends bytes to a file that is kept open. Returns where they are.
     ///
     /// # Errors
-    /// Those of the system.
+    /// Errors of the system.
     pub(crate) fn append(&self, bytes: &[u8]) -> Result<Range<u64>> {
         let open = self.open.as_ref().ok_or_else(|| Error::other("the file is not open"))?;
         let mut file = &*lock(open);

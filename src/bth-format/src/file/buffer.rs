@@ -145,12 +145,13 @@ impl Buffer {
         if length == 0 {
             return Self::copy(&[]);
         }
+        // Asked before: under a limit on addresses the map itself counts as used.
+        let is_paged = length >= ASKED && length > memory::available();
         // SAFETY: the bytes of a `Mmap` must neither change nor become inaccessible while
         // references to them live. The map is read-only and owned by this buffer, which lends
         // references for its own lifetime only, and the caller promises that nobody changes or
         // shrinks the file before the buffer is dropped.
         let map = unsafe { Mmap::map(&file) }.map_err(|e| Error::io(path, e))?;
-        let is_paged = length >= ASKED && length > memory::available();
         if is_paged {
             // The advice may be refused: then more is read, and all else is the same.
             #[cfg(unix)]

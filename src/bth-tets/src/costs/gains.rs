@@ -127,7 +127,8 @@ impl Sampled {
                 let Ok(k) = nodes.binary_search(&at) else { continue };
                 let node = &bvh.nodes[at as usize];
                 let share = if ray.tmax.is_finite() { SHORT_STEPS } else { 1.0 };
-                let mut time = prices.walk(node.count, share * steps(Start::Surface, k), hits(traced, node));
+                let mut time =
+                    prices.surface(node.count, share * steps(Start::Surface, k), hits(traced, node));
                 if at != 0 && leaves(ray, traced, node) {
                     time += bvh_time;
                 }
@@ -141,7 +142,10 @@ impl Sampled {
             gain.steps = steps(Start::Surface, k);
             gain.saved += weights[1] * (gain.bvh - gain.tets) / self.surface.len().max(1) as f64;
             let n = steps(Start::Outside, k);
-            let walked = prices.walk(node.count, n, LINES_THAT_HIT);
+            let walked = match at {
+                0 => prices.outside(node.count, n, LINES_THAT_HIT),
+                _ => prices.alone(node.count, n, LINES_THAT_HIT),
+            };
             // A ray that enters the root's tetrahedra is not prepared for the BVH.
             let prepared = if at == 0 { costs.ray } else { 0.0 };
             let through = costs.outside * self.entered(at..at + 2 * node.count - 1) as f64

@@ -28,5 +28,5 @@ pub use choose::{choose, choose_of_all};
 pub use estimate::{Estimator, Start};
 pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, SelectionOutcome, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
-pub use profile::{BvhCosts, Profile, Walk};
+pub use profile::{BvhCosts, Profile, TetCosts, Walk};
 pub use tet_walk::{TetWalker, Walked, mean_steps};

@@ -1,7 +1,7 @@
 //! Costs of rays through a tetrahedralization, by its size.
 
 use super::profile::BvhCosts;
-use super::{CostOptions, Start};
+use super::{CostOptions, Start, Walk};
 use bth_format::layout::{Link32, TetVertex};
 
 /// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on
@@ -21,7 +21,7 @@ pub(super) struct Prices<'a> {
 
 impl<'a> Prices<'a> {
     pub(super) fn new(options: &'a CostOptions) -> Self {
-        let step = options.profile.tets.step[0];
+        let step = options.profile.tets.surface.step[0];
         Prices { options, scale: options.c_tet.map_or(1.0, |c| c / step.max(f64::MIN_POSITIVE)) }
     }
 
@@ -37,11 +37,25 @@ impl<'a> Prices<'a> {
                 + VERTICES_PER_TRIANGLE * size_of::<TetVertex>() as f64)
     }
 
-    /// Nanoseconds of a ray through the node's tetrahedra. The share `hits` of such rays ends at a
-    /// triangle.
-    pub(super) fn walk(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
-        let profile = &self.options.profile;
-        self.scale * profile.tets.cost(steps, hits, self.walked(triangles), profile.bytes)
+    fn cost(&self, walk: &Walk, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.scale * walk.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
+    }
+
+    /// Nanoseconds of a ray that starts on a triangle of the node. The share `hits` of such rays ends
+    /// at a triangle.
+    pub(super) fn surface(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.cost(&self.options.profile.tets.surface, triangles, steps, hits)
+    }
+
+    /// Nanoseconds of a ray that enters the box of the whole object, sixteen rays at a time.
+    pub(super) fn outside(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.cost(&self.options.profile.tets.outside, triangles, steps, hits)
+    }
+
+    /// Nanoseconds of a ray that enters the box of a leaf below a BVH node, where rays enter one by
+    /// one.
+    pub(super) fn alone(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.cost(&self.options.profile.tets.alone, triangles, steps, hits)
     }
 
     /// Steps of the node's tetrahedralization, estimated.

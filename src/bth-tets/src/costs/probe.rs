@@ -157,7 +157,7 @@ impl Prober<'_> {
             let Some(walked) = walker.walk(ray) else { continue };
             let traced_bvh = walk(mesh, bvh, ray, |_| {});
             let plain = costs.ray + costs.surface * f64::from(traced_bvh.visits);
-            let mut time = prices.walk(at.count, f64::from(walked.steps), f64::from(u8::from(walked.hit)));
+            let mut time = prices.surface(at.count, f64::from(walked.steps), f64::from(u8::from(walked.hit)));
             if node != 0 && walked.left && leaves(ray, &traced_bvh, at) {
                 time += plain;
             }
@@ -193,8 +193,10 @@ impl Prober<'_> {
             let (steps, hits) = (f64::from(walked.steps), f64::from(u8::from(walked.hit)));
             saved += costs.outside * f64::from(visits);
             // A ray that enters the root's tetrahedra is not prepared for the BVH.
-            let prepared = if node == 0 { costs.ray } else { 0.0 };
-            saved += prepared - prices.walk(at.count, steps, hits);
+            saved -= match node {
+                0 => prices.outside(at.count, steps, hits) - costs.ray,
+                _ => prices.alone(at.count, steps, hits),
+            };
             traced += 1.0;
         }
         at.half_area() / bvh.nodes[0].half_area() * saved / traced.max(1.0)

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Times on one thread, nanoseconds a ray. Rays through the BVH are in batches.
+/// Times on one thread, nanoseconds a ray in batches unless stated otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
@@ -12,8 +12,8 @@ pub struct Profile {
     pub isa: String,
     /// The BVH.
     pub bvh: BvhCosts,
-    /// Walks through tetrahedra, one ray after the other.
-    pub tets: Walk,
+    /// Tetrahedra.
+    pub tets: TetCosts,
     /// Sizes in bytes of the tetrahedra that the two costs of a step were measured on.
     pub bytes: [f64; 2],
 }
@@ -33,6 +33,18 @@ pub struct BvhCosts {
     pub node: f64,
     /// A visit of a leaf of up to 16 triangles.
     pub block: f64,
+}
+
+/// Costs of walks through tetrahedra.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TetCosts {
+    /// Entered through the box, sixteen rays at a time: where the tetrahedra are the whole object.
+    pub outside: Walk,
+    /// From a known triangle, sixteen rays at a time.
+    pub surface: Walk,
+    /// Entered through the box, ray by ray: where they are a leaf of a BVH.
+    pub alone: Walk,
 }
 
 /// Costs of a walk.

@@ -39,7 +39,7 @@ fn by_recursion(bvh: &BinaryBvh, marks: &Marks, i: usize, options: &CostOptions,
     let depth = f64::from(depths) / f64::from(node.count);
     let steps = options.estimator.steps(Start::Outside, node.count, depth);
     // The tetrahedra fit the caches, so the first cost of a step applies.
-    let walk = &options.profile.tets;
+    let walk = options.profile.tets.outside;
     if marks.suitable[i]
         && node.count <= options.maximum_triangles
         && walk.cost(steps, 0.52, 0.0, options.profile.bytes) < sah
@@ -62,7 +62,7 @@ fn the_papers_rule_chooses_what_its_recursion_chooses() {
                 CostOptions { estimator, minimum_triangles: 8, maximum_triangles: 200, ..paper() };
             options.profile.bvh.outside = 3.4;
             let c_tet = 0.5 + (seed % 7) as f64 * 0.2;
-            options.profile.tets = Walk { entry: 6.0, hit: 0.0, step: [c_tet, 2.0 * c_tet] };
+            options.profile.tets.outside = Walk { entry: 6.0, hit: 0.0, step: [c_tet, 2.0 * c_tet] };
             let (choice, report) = chosen(&bvh, &marks, &options);
             let mut expected = Vec::new();
             by_recursion(&bvh, &marks, 0, &options, &mut expected);

@@ -46,7 +46,7 @@ pub(super) fn choose(
         let suitable = marks.suitable[i];
         let depth = sum.depth as f64 / f64::from(node.count);
         let n_avg = paper.estimator.steps(Start::Outside, node.count, depth);
-        let cost_tet = prices.walk(node.count, n_avg, LINES_THAT_HIT);
+        let cost_tet = prices.outside(node.count, n_avg, LINES_THAT_HIT);
         let cost_bvh = paper.visit * (sum.inner_area + sum.leaf_area) / node.half_area();
         let decision = if node.count < options.minimum_triangles {
             SelectionOutcome::RefusedSmall

@@ -210,22 +210,50 @@ impl RoundedIntersection {
     }
 }
 
+/// A line and a triangle in f64: its intersection with the triangle's plane, and on which sides of
+/// the edges it passes.
+struct LineSides {
+    rounded: RoundedIntersection,
+    /// Weights of the three corners.
+    weight: [f64; 3],
+    /// Bounds of the errors of `weight` and of the volume.
+    error: [f64; 2],
+    /// The line certainly crosses the triangle, or certainly misses it.
+    is_inside: bool,
+    is_outside: bool,
+}
+
+impl LineSides {
+    /// There are no branches, so that the compiler can vectorize a loop of it.
+    #[inline(always)]
+    fn new(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> LineSides {
+        let (terms, error) = OriginTerms::with_errors(origin, corners);
+        let norm = max_norm(direction);
+        let rounded = RoundedIntersection::new(&terms, direction, norm);
+        let [second, third, determinant] = rounded.weight;
+        let first = determinant - second - third;
+        let least = lesser(lesser(first, second), third);
+        let greatest = greater(greater(first, second), third);
+        let bound = error[0] * norm;
+        LineSides {
+            rounded,
+            weight: [first, second, third],
+            error: [bound, error[1]],
+            is_inside: (least > bound) | (greatest < -bound),
+            is_outside: (least < -bound) & (greatest > bound),
+        }
+    }
+}
+
 /// Decides in f64 whether a line crosses a triangle and computes t, u and v, or returns
 /// [`Estimate::Open`] where the error bounds do not allow it.
 #[inline(always)]
 pub(crate) fn estimate(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> Estimate {
-    let (terms, error) = OriginTerms::with_errors(origin, corners);
-    let norm = max_norm(direction);
-    let rounded = RoundedIntersection::new(&terms, direction, norm);
-    let [second, third, determinant] = rounded.weight;
-    let first = determinant - second - third;
-    let least = lesser(lesser(first, second), third);
-    let greatest = greater(greater(first, second), third);
-    let error = [error[0] * norm, error[1]];
-    if (least < -error[0]) & (greatest > error[0]) {
+    let LineSides { rounded, weight, error, is_inside, is_outside } =
+        LineSides::new(origin, direction, corners);
+    if is_outside {
         return Estimate::Missed;
     }
-    let is_inside = (least > error[0]) | (greatest < -error[0]);
     if is_inside && rounded.is_accurate {
         return Estimate::Intersects(rounded.intersection());
     }
@@ -234,7 +262,19 @@ pub(crate) fn estimate(origin: impl Origin, direction: [f64; 3], corners: [[f64;
     } else {
         [f64::NEG_INFINITY, f64::INFINITY]
     };
-    Estimate::Open(UncertainWeights { rounded, weight: [first, second, third], bound: error[0] }, t)
+    Estimate::Open(UncertainWeights { rounded, weight, bound: error[0] }, t)
+}
+
+/// The intersection of a line and a triangle. It is valid only if the flag is true: where
+/// [`estimate`] returns [`Estimate::Intersects`].
+#[inline(always)]
+pub(crate) fn certain_intersection(
+    origin: [f64; 3],
+    direction: [f64; 3],
+    corners: [[f64; 3]; 3],
+) -> (Intersection, bool) {
+    let LineSides { rounded, is_inside, .. } = LineSides::new(origin, direction, corners);
+    (rounded.intersection(), is_inside & rounded.is_accurate)
 }
 
 /// The intersection of a line with a triangle that it crosses, if t certainly has a relative error

@@ -1,7 +1,9 @@
 //! The arithmetic of [`super::exact`] in f64 for sixteen pairs of a ray and a triangle that the f32
 //! filter is sure the ray hits.
 
-use crate::intersect::exact::{OriginTerms, RoundedIntersection, reported, reported_barycentric};
+use crate::intersect::exact::{
+    Intersection, OriginTerms, RoundedIntersection, certain_intersection, reported, reported_barycentric,
+};
 use crate::intersect::exact_ray::LineLanes;
 use crate::intersect::origin::Origin;
 use crate::intersect::vector::max_norm;
@@ -224,5 +226,120 @@ impl Intersections {
     fn set_masks<S: Simd>(&mut self, s: S, lanes: u32, accurate: &[u32; LANES]) {
         self.certain = s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(accurate))) & lanes;
         self.open = lanes & !self.certain;
+    }
+}
+
+/// What [`super::exact::estimate`] decides of sixteen pairs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Estimates {
+    /// By lane: t, then the weights of [`Intersection`].
+    rows: [[f64; LANES]; 4],
+    /// Bits of the lanes whose line certainly crosses the triangle, with accurate t, u and v.
+    pub(crate) certain: u32,
+}
+
+impl Estimates {
+    /// The estimates of all lanes.
+    #[inline(always)]
+    pub(crate) fn new<S: Simd>(s: S, pairs: &Pairs) -> Estimates {
+        let Pairs { origin, direction, corner } = pairs;
+        let (mut rows, mut certain) = ([[0.0; LANES]; 4], [0; LANES]);
+        // There are no branches in this loop, so that the compiler vectorizes it.
+        for i in 0..LANES {
+            let corners = corner.corners(i);
+            let (Intersection { t, weight }, is_certain) =
+                certain_intersection(lane(origin, i), lane(direction, i), corners);
+            certain[i] = u32::from(is_certain);
+            rows[0][i] = t;
+            (rows[1][i], rows[2][i], rows[3][i]) = (weight[0], weight[1], weight[2]);
+        }
+        Estimates { rows, certain: s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(&certain))) }
+    }
+
+    /// The intersection of a lane that is certain.
+    pub(crate) fn intersection(&self, lane: usize) -> Intersection {
+        let [t, u, v, determinant] = [0, 1, 2, 3].map(|row: usize| self.rows[row][lane]);
+        Intersection { t, weight: [u, v, determinant] }
+    }
+
+    /// Bits of the lanes whose line passes against the triangle's normal.
+    #[inline(always)]
+    pub(crate) fn against_normal(&self) -> u32 {
+        let mut bits = 0;
+        for i in 0..LANES {
+            bits |= u32::from(self.rows[3][i] < 0.0) << i;
+        }
+        bits
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::exact::{Estimate, estimate};
+    use crate::simd::{Isa, Kernel};
+    use bth_random::Rng;
+
+    struct EstimatesOf<'a>(&'a Pairs);
+
+    impl Kernel for EstimatesOf<'_> {
+        type Output = (Estimates, u32);
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> (Estimates, u32) {
+            let estimates = Estimates::new(s, self.0);
+            (estimates, estimates.against_normal())
+        }
+    }
+
+    #[test]
+    fn estimates_in_lanes_have_the_bits_of_those_of_one_pair() {
+        let mut rng = Rng::new(71);
+        let (mut certain, mut open, mut against) = (0, 0, 0);
+        for round in 0..if cfg!(miri) { 20 } else { 2_000 } {
+            let scale = [1.0, 1e-20, 1e20][round % 3];
+            let mut number = || (rng.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0) * scale;
+            let mut pairs = Pairs::NONE;
+            for i in 0..LANES {
+                for k in 0..3 {
+                    let corners = [number(), number(), number()];
+                    // Rays that aim into the triangle, at an edge of it or past it.
+                    let target = match i % 4 {
+                        0 => 0.5 * corners[0] + 0.5 * corners[1],
+                        3 => number(),
+                        _ => 0.25 * corners[0] + 0.25 * corners[1] + 0.5 * corners[2],
+                    };
+                    pairs.origin[k][i] = number();
+                    pairs.direction[k][i] = target - pairs.origin[k][i];
+                    for corner in 0..3 {
+                        pairs.corner[corner][k][i] = corners[corner];
+                    }
+                }
+            }
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let (estimates, against_normal) = isa.run(EstimatesOf(&pairs));
+                for i in 0..LANES {
+                    let corners = [0, 1, 2].map(|corner: usize| lane(&pairs.corner[corner], i));
+                    let one = estimate(lane(&pairs.origin, i), lane(&pairs.direction, i), corners);
+                    let is_certain = estimates.certain >> i & 1 == 1;
+                    match one {
+                        Estimate::Intersects(intersection) => {
+                            assert!(is_certain, "{isa}, lane {i} of {pairs:?}");
+                            assert_eq!(estimates.intersection(i), intersection, "{isa}");
+                            let is_against = intersection.weight[2] < 0.0;
+                            assert_eq!(against_normal >> i & 1 == 1, is_against, "{isa}");
+                            (certain, against) = (certain + 1, against + u32::from(is_against));
+                        }
+                        Estimate::Missed | Estimate::Open(..) => {
+                            assert!(!is_certain, "{isa}, lane {i} of {pairs:?}");
+                            open += 1;
+                        }
+                    }
+                }
+            }
+        }
+        assert!(
+            certain > open / 4 && open > certain / 4 && against > certain / 4,
+            "{certain}, {open}, {against}"
+        );
     }
 }

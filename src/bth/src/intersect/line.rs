@@ -183,4 +183,33 @@ impl Line {
         let off = self.t_error(least.abs().max(greatest.abs()));
         (least - off, greatest + off)
     }
+
+    /// Returns true if the corners of a triangle that the line certainly crosses are clockwise
+    /// about it.
+    pub(crate) fn turns_clockwise([a, b, c]: [&Projected; 3]) -> bool {
+        cross(b, c) + cross(c, a) + cross(a, b) < 0.0
+    }
+
+    /// Lower bound of the t at which the line crosses a triangle that it certainly crosses, given
+    /// the error of the projected coordinates.
+    pub(crate) fn t_before(&self, corners: [&Projected; 3], error: f64) -> f64 {
+        let (depth, shift) = Self::depth_of_crossing(corners, error);
+        let t = depth * self.inverse_depth;
+        t - shift * self.inverse_depth.abs() - self.t_error(t)
+    }
+
+    /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its
+    /// error.
+    fn depth_of_crossing([a, b, c]: [&Projected; 3], error: f64) -> (f64, f64) {
+        let weight = [cross(b, c), cross(c, a), cross(a, b)];
+        let bound = 4.0 * error * (a.size() + b.size() + c.size() + error);
+        let sum = weight[0] + weight[1] + weight[2];
+        let depth = (weight[0] * a.depth + weight[1] * b.depth + weight[2] * c.depth) / sum;
+        let farthest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
+        // The errors of the weights shift the depth within the range of depths. The roundings of
+        // the sum above shift it by less than 2^-48 of the largest |depth|.
+        let shift =
+            2.0 * farthest * (4.0 * bound / (sum.abs() - 4.0 * bound).max(0.0)) + farthest * RATIO_ERROR;
+        (depth, shift)
+    }
 }

@@ -1,5 +1,5 @@
 //! Tracing of one object by batches of rays. Coherent rays are traced in packets, the others
-//! interleaved through the BVH.
+//! interleaved through the BVH. An object that is one special leaf is entered without it.
 
 use super::scratch::Scratch;
 use super::single::{RayOfBatch, any_in_scalar, nearest_in_scalar};
@@ -10,6 +10,7 @@ use crate::intersect::exact_ray::Lines;
 use crate::query::sink::{Answers, Sink};
 use crate::query::with_batch_goal;
 use crate::rays::{Ray, StartRay};
+use crate::shortcuts::{self, RAYS_PER_PART, SpecialLeaf};
 use crate::simd::Isa;
 use crate::starts::prepare::PreparedStarts;
 use bth_format::layout::NONE;
@@ -47,6 +48,8 @@ pub(crate) fn trace_batch(
     if order.is_some() {
         // Too few rays are left of most packets.
         through_bvh(isa, object, rays, order, (scratch, sink));
+    } else if let (Some(leaf), true) = (shortcuts::whole(object), lines.are_rays()) {
+        through_leaf(isa, object, leaf, rays, (scratch, sink));
     } else {
         let packet_rays = in_packets(isa, object, rays, scratch, sink);
         if packet_rays < rays.len() {
@@ -56,6 +59,27 @@ pub(crate) fn trace_batch(
             scratch.packets.rest = rest;
         }
     }
+}
+
+/// Traces rays through the special leaf that is the whole object.
+#[cold]
+#[inline(never)]
+fn through_leaf(
+    isa: Isa,
+    object: &ObjectView<'_>,
+    leaf: SpecialLeaf,
+    rays: &[Ray],
+    (scratch, sink): (&mut Scratch, &mut Sink<'_>),
+) {
+    let mut special = std::mem::take(&mut scratch.special);
+    for (part, rays) in rays.chunks(RAYS_PER_PART).enumerate() {
+        let sink = &mut sink.part(part * RAYS_PER_PART);
+        leaf.trace(object, rays, &mut special, sink);
+        if !special.rest.is_empty() {
+            through_bvh(isa, object, rays, Some(&special.rest), (scratch, sink));
+        }
+    }
+    scratch.special = special;
 }
 
 /// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the

@@ -2,6 +2,7 @@
 
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
+use crate::shortcuts::SpecialScratch;
 use crate::starts::prepare::PreparedStarts;
 use std::cell::Cell;
 
@@ -10,6 +11,7 @@ use std::cell::Cell;
 pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
     pub(super) packets: PacketScratch,
+    pub(super) special: SpecialScratch,
     pub(super) starts: PreparedStarts,
 }
 

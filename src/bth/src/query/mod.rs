@@ -134,6 +134,18 @@ pub(crate) struct RayQuery<G> {
 /// The query of special leaves, which are compiled once for both goals.
 pub(crate) type EitherQuery = RayQuery<EitherGoal>;
 
+impl EitherQuery {
+    /// For any hits: offers a certain intersection for which only bounds of t are known. The bounds
+    /// include all roundings. Returns true if the query is complete.
+    pub(crate) fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
+        let finite = f64::from(f32::MIN) <= t.0 && t.1 <= f64::from(f32::MAX);
+        if finite && f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax) {
+            self.accept();
+        }
+        self.is_complete()
+    }
+}
+
 impl<G: Goal> RayQuery<G> {
     /// A query without hits over the range of `ray`.
     #[inline(always)]
@@ -193,6 +205,14 @@ impl<G: Goal> RayQuery<G> {
             self.best = intersection;
         }
         self.is_complete()
+    }
+
+    /// Notes that a triangle is certainly hit within the ray's range, which completes an any-hit
+    /// query.
+    pub(crate) fn accept(&mut self) {
+        if self.goal.is_any() {
+            (self.triangle, self.is_index) = (0, false);
+        }
     }
 
     /// Upper bound of the exact t of intersections that can still change the result.

@@ -71,10 +71,33 @@ fn hits_at_infinity_are_none() {
         nearest.offer(triangle, intersection);
         assert_eq!(nearest.answer(&[], 0).is_hit(), is_hit, "{t}");
         assert_eq!(any.offer(triangle, intersection), is_hit, "{t}");
+        let mut either = EitherQuery::new(EitherGoal { is_any: true }, &ray);
+        assert_eq!(either.offer_bounds((t, t)), is_hit, "{t}");
         let in_object =
             Hit { t: (t / 4.0) as f32, u: 0.0, v: 0.0, primitive: PrimitiveRef { instance: 0, triangle: 0 } };
         assert_eq!(better(&ray, &Hit::MISS, &in_object, 4.0).is_some(), is_hit, "{t}");
     }
+}
+
+#[test]
+fn bounds_complete_queries_for_any_hit_only_if_all_t_between_them_do() {
+    let mut rng = Rng::new(84);
+    let mut completed = 0;
+    for _ in 0..20_000 {
+        let ray = Ray { origin: [0.0; 3], tmin: value(&mut rng), direction: [1.0; 3], tmax: value(&mut rng) };
+        let (a, b) = (f64::from(value(&mut rng)), f64::from(value(&mut rng)));
+        let new = |is_any| EitherQuery::new(EitherGoal { is_any }, &ray);
+        let (mut nearest, mut any) = (new(false), new(true));
+        assert!(!nearest.offer_bounds((a, b)) && nearest.found().is_none(), "{ray:?}");
+        let done = any.offer_bounds((a, b));
+        assert_eq!(any.answer(&[], 0).is_hit(), done, "{ray:?}");
+        completed += u32::from(done);
+        for t in [a, b, (a + b) / 2.0].into_iter().filter(|t| done && (a..=b).contains(t)) {
+            let intersection = Intersection { t, weight: [0.0, 0.0, 1.0] };
+            assert!(new(true).offer(TriangleRef::id(0, &[]), intersection), "{ray:?}: {t}");
+        }
+    }
+    assert!(completed > 1_000, "{completed}");
 }
 
 #[test]

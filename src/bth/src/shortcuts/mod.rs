@@ -7,6 +7,7 @@
 //! | shortcut | begins | skips |
 //! |---|---|---|
 //! | [special leaf](SpecialLeaf): tetrahedra | in a leaf, at a face | the tree below it |
+//! | [`whole`] | in the only special leaf | the root |
 //! | [entry node](FindEntryNode) of coherent rays | at nodes below the root | the nodes above |
 //! | [free directions](free) of a start | at a later t, or never | what lies before |
 //!
@@ -17,4 +18,5 @@ pub(crate) mod free;
 mod tets;
 
 pub(crate) use entry_node::{ENTRY_RAYS, FindEntryNode, entry_run};
-pub(crate) use tets::leaf::{SpecialLeaf, has_special_leaves, special};
+pub(crate) use tets::leaf::{SpecialLeaf, has_special_leaves, special, whole};
+pub(crate) use tets::whole::{RAYS_PER_PART, SpecialScratch};

@@ -233,12 +233,13 @@ pub trait Simd: Lanewise {
         }
         [self.load(&columns[0]), self.load(&columns[1]), self.load(&columns[2])]
     }
-    /// Loads rows of eight words and transposes them: lane i of vector k is element k of row
-    /// `row[i]`, and is undefined where the mask is clear. Much faster than eight gathers on all
-    /// instruction sets.
+    /// Loads rows of four and transposes them: lane i of vector k is element k of row `row[i]`, and
+    /// is undefined where the mask is clear. Much faster than four gathers on all instruction sets.
     ///
     /// # Panics
     /// If the index of a row lies outside of `from` where the mask is set.
+    fn rows4(self, m: Self::M, from: &[[f32; 4]], row: Self::U) -> [Self::F; 4];
+    /// Like [`Self::rows4`], for rows of eight words.
     fn rows8(self, m: Self::M, from: &[[u32; 8]], row: Self::U) -> [Self::U; 8];
     /// Transposes sixteen rows of eight words: lane i of vector k is element k of row i.
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [Self::U; 8];
@@ -253,6 +254,9 @@ pub trait Simd: Lanewise {
             to[i] = [words[0][i], words[1][i], words[2][i], words[3][i], words[4][i]];
         }
     }
+    /// Assigns the elements of `from` in order to the lanes whose mask is set, from `from[0]` on;
+    /// the other lanes keep the values of `a`.
+    fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
     /// Like [`Self::lookup`].
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
     /// True if [`Self::lookup_f64`] compiles to a few instructions.
@@ -273,6 +277,14 @@ pub trait Simd: Lanewise {
     /// # Panics
     /// If an index lies outside of `from` where the mask is set.
     fn gather_u(self, m: Self::M, from: &[u32], at: Self::U) -> Self::U;
+    /// First and second words of elements of a slice, undefined where the mask is clear. AVX-512
+    /// loads each pair at once.
+    ///
+    /// # Panics
+    /// Like [`Self::gather_u`].
+    fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
+    /// Like [`Self::expand`].
+    fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
     /// True if [`Self::compress`] compiles to a few instructions.
     const HAS_FAST_COMPRESS: bool = false;
     /// Stores the lanes whose bit is set, in order, from `to[0]` on, and returns their number. The

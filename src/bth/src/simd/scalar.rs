@@ -42,6 +42,15 @@ fn mask_bits(m: &M) -> u32 {
 }
 
 #[inline(always)]
+fn expand(a: &U, m: &M, from: &U) -> U {
+    let mut out = *a;
+    for (next, lane) in lanes(mask_bits(m)).enumerate() {
+        out[lane] = from[next];
+    }
+    out
+}
+
+#[inline(always)]
 fn compress(bits: u32, a: &U, to: &mut U) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
@@ -112,6 +121,12 @@ fn columns<T: Copy + Default, const N: usize>(m: &M, from: &[[T; N]], row: &U) -
 #[inline(always)]
 fn gather(m: &M, from: &[u32], at: &U) -> U {
     from_fn(|i| if m[i] != 0 { from[at[i] as usize] } else { 0 })
+}
+
+#[inline(always)]
+fn gather_pair(m: &M, from: &[[u32; 2]], at: &U) -> (U, U) {
+    let pair: [[u32; 2]; LANES] = from_fn(|i| if m[i] != 0 { from[at[i] as usize] } else { [0; 2] });
+    (pair.map(|p| p[0]), pair.map(|p| p[1]))
 }
 
 /// Defines methods of whole vectors, each a loop over the lanes.
@@ -252,6 +267,10 @@ impl Simd for Scalar {
         floats(lookup(&words(table), &at))
     }
     #[inline(always)]
+    fn rows4(self, m: M, from: &[[f32; 4]], row: U) -> [F; 4] {
+        columns(&m, from, &row)
+    }
+    #[inline(always)]
     fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
         columns(&m, from, &row)
     }
@@ -260,12 +279,24 @@ impl Simd for Scalar {
         from_fn(|k| from_fn(|i| rows[i][k]))
     }
     #[inline(always)]
+    fn expand(self, a: F, m: M, from: &F) -> F {
+        floats(expand(&words(a), &m, &words(*from)))
+    }
+    #[inline(always)]
     fn lookup_u(self, table: U, at: U) -> U {
         lookup(&table, &at)
     }
     #[inline(always)]
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {
         gather(&m, from, &at)
+    }
+    #[inline(always)]
+    fn gather_pair(self, m: M, from: &[[u32; 2]], at: U) -> (U, U) {
+        gather_pair(&m, from, &at)
+    }
+    #[inline(always)]
+    fn expand_u(self, a: U, m: M, from: &U) -> U {
+        expand(&a, &m, from)
     }
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut U) -> usize {

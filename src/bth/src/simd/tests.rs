@@ -48,7 +48,10 @@ impl Kernel for AllOperations<'_> {
         let mask = s.mask(self.bits);
         let other = s.lt(a, b);
         let index = s.and_u(x, s.splat_u(31));
+        let table: Vec<f32> = (0..32).map(|i| i as f32 * 1.5).collect();
         let words: Vec<u32> = (0..32).map(|i| i * 77).collect();
+        let pairs: Vec<[u32; 2]> = (0..32).map(|i| [i * 3, i * 5 + 1]).collect();
+        let (first, second) = s.gather_pair(mask, &pairs, index);
         let bytes: [u8; LANES] = self.u.map(|x| x as u8);
         let mut compressed = [0; LANES];
         let count = s.compress(self.bits, x, &mut compressed);
@@ -107,6 +110,10 @@ impl Kernel for AllOperations<'_> {
                 turned.extend(f(x));
             }
         }
+        let zero = s.splat(0.0);
+        for column in s.rows4(mask, table.as_chunks().0, s.and_u(x, s.splat_u(7))) {
+            turned.extend(f(s.select(mask, column, zero)));
+        }
         for column in s.rows8(mask, words.as_chunks().0, s.and_u(x, s.splat_u(3))) {
             turned.extend(u(s.select_u(mask, column, s.splat_u(0))));
         }
@@ -126,6 +133,7 @@ impl Kernel for AllOperations<'_> {
             f(s.select(other, a, b)),
             f(s.lookup(a, x)),
             vec![s.least(s.load(&ordered)).to_bits()],
+            f(s.expand(a, mask, self.b)),
             u(s.load_bytes(&bytes)),
             u(s.add_u(x, y)),
             u(s.add_where(x, mask, y)),
@@ -138,6 +146,9 @@ impl Kernel for AllOperations<'_> {
             u(s.select_u(mask, x, y)),
             u(s.lookup_u(x, y)),
             u(s.gather_u(mask, &words, index)),
+            u(s.select_u(mask, first, s.splat_u(0))),
+            u(s.select_u(mask, second, s.splat_u(0))),
+            u(s.expand_u(x, mask, self.v)),
             u(s.bits(a)),
             f(s.floats(s.bits(a))),
             s.greatest_of_three([0, 1, 2, 3].map(|i| self.a[i].abs())).map(f32::to_bits).to_vec(),
@@ -219,6 +230,8 @@ fn a_gather_outside_of_its_slice_panics_on_every_instruction_set() {
             let rows = [1.0, 2.0, 3.0];
             let got = match self.0 {
                 0 => s.gather_u(m, &rows.map(f32::to_bits), at),
+                1 => s.gather_pair(m, &rows.map(|x| [x.to_bits(); 2]), at).1,
+                2 => s.bits(s.rows4(m, &rows.map(|x| [x; 4]), at)[3]),
                 _ => s.rows8(m, &rows.map(|x| [x.to_bits(); 8]), at)[7],
             };
             let mut out = [0; LANES];
@@ -227,7 +240,7 @@ fn a_gather_outside_of_its_slice_panics_on_every_instruction_set() {
         }
     }
     for isa in Isa::ALL {
-        for access in 0..2 {
+        for access in 0..4 {
             for index in [3, 4, 1 << 31, u32::MAX] {
                 let caught = std::panic::catch_unwind(|| isa.run(Outside(access, index, 0xffff)));
                 assert!(caught.is_err(), "{isa} {access} {index}");

@@ -19,7 +19,7 @@ use crate::report::{Head, Report, Subject};
 use crate::structures::{self, Use};
 use crate::tracer::Tracer;
 use anyhow::Result;
-use bth_compile::costs::{self, BvhCosts, Profile, Select, Walk};
+use bth_compile::costs::{self, BvhCosts, Profile, Select, TetCosts, Walk};
 use bth_compile::pipeline::{self, Structure};
 use bth_compile::{Silent, bvh, marks, tets};
 use clap::Args;
@@ -59,7 +59,8 @@ const FEWEST_TRIANGLES: u32 = 64;
 /// camera rays to blobs of 6,000 and 150,000 faces (Intel Xeon, family 6, model 207, 2026-11-28).
 fn scalar_profile(stored: usize) -> Profile {
     let step = if stored == TET32 { [23.6, 30.5] } else { [24.0, 29.1] };
-    let tets = Walk { entry: 77.0, hit: 0.0, step };
+    let walk = Walk { entry: 77.0, hit: 0.0, step };
+    let tets = TetCosts { outside: walk, surface: walk, alone: walk };
     let bvh = BvhCosts { ray: 0.0, outside: 12.1, ..Profile::default().bvh };
     Profile { isa: "scalar".to_owned(), bytes: [648e3, 15.6e6], bvh, tets, ..Profile::default() }
 }

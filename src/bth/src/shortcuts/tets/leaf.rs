@@ -26,6 +26,11 @@ pub(crate) fn special(child: Child) -> Option<SpecialLeaf> {
     }
 }
 
+/// The special leaf that is the whole object, if it is.
+pub(crate) fn whole(object: &ObjectView<'_>) -> Option<SpecialLeaf> {
+    special(Child::from_code(object.header.root)?)
+}
+
 /// Returns true if an object has special leaves.
 #[inline(always)]
 pub(crate) fn has_special_leaves(object: &ObjectView<'_>) -> bool {
@@ -33,6 +38,11 @@ pub(crate) fn has_special_leaves(object: &ObjectView<'_>) -> bool {
 }
 
 impl SpecialLeaf {
+    #[inline(always)]
+    pub(super) fn row(self) -> u32 {
+        self.row
+    }
+
     /// Offers the hits of a ray in this leaf to its query. Returns true if the query is complete.
     #[inline(never)]
     pub(crate) fn enter<G: Goal, C: Count>(

@@ -9,8 +9,8 @@ pub(super) mod doubles;
 mod packing;
 mod rows;
 
-use self::packing::compression;
-use self::rows::{columns8, transpose8};
+use self::packing::{compression, expansion};
+use self::rows::{columns8, transpose4, transpose8};
 use super::{
     IN_ORDER, LANES, Lanewise, Part, Simd, assert_indices, avx_doubles, one_piece, scalar, valid_indices,
     x86_token,
@@ -231,6 +231,24 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
+    fn rows4(self, m: M, from: &[[f32; 4]], row: U) -> [F; 4] {
+        let row = valid_indices(self, m, row, from.len());
+        // SAFETY: `valid_indices` returns indices of rows of the slice; unaligned loads.
+        unsafe {
+            macro_rules! halves {
+                ($a:literal $b:literal) => {
+                    _mm256_insertf128_ps::<1>(
+                        _mm256_castps128_ps256(_mm_loadu_ps(from.as_ptr().add(row[$a] as usize).cast())),
+                        _mm_loadu_ps(from.as_ptr().add(row[$b] as usize).cast()),
+                    )
+                };
+            }
+            let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
+            let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
+            [[low[0], high[0]], [low[1], high[1]], [low[2], high[2]], [low[3], high[3]]]
+        }
+    }
+    #[inline(always)]
     fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
         let row = valid_indices(self, m, row, from.len());
         // SAFETY: `valid_indices` returns indices of rows of the slice.
@@ -253,6 +271,34 @@ impl Simd for Avx2 {
                 _mm256_mask_i32gather_epi32::<4>(zero, from, at[1], m[1]),
             ]
         }
+    }
+    #[inline(always)]
+    fn gather_pair(self, m: M, from: &[[u32; 2]], at: U) -> (U, U) {
+        let flat = from.as_flattened();
+        let even = self.shl_u::<1>(at);
+        let odd = self.or_u(even, self.splat_u(1));
+        // The indices themselves are checked, because an index that is too great might wrap into
+        // the range when it is doubled.
+        assert_indices(self, m, at, from.len());
+        (self.gather_u(m, flat, even), self.gather_u(m, flat, odd))
+    }
+    #[inline(always)]
+    fn expand(self, a: F, m: M, from: &[f32; LANES]) -> F {
+        let bits = self.mask_bits(m);
+        let low = from.as_ptr();
+        // The elements of the high half follow the elements of the low half, at most eight.
+        let high = from[(bits as u8).count_ones() as usize..][..8].as_ptr();
+        // SAFETY: eight readable floats each; unaligned loads.
+        unsafe {
+            let (low, high) = (_mm256_loadu_ps(low), _mm256_loadu_ps(high));
+            let low = _mm256_permutevar8x32_ps(low, expansion(bits as u8));
+            let high = _mm256_permutevar8x32_ps(high, expansion((bits >> 8) as u8));
+            self.select(m, [low, high], a)
+        }
+    }
+    #[inline(always)]
+    fn expand_u(self, a: U, m: M, from: &[u32; LANES]) -> U {
+        self.bits(self.expand(self.floats(a), m, &from.map(f32::from_bits)))
     }
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {

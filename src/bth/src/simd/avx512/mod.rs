@@ -9,9 +9,9 @@ mod rows;
 mod sort;
 mod transpose;
 
-use self::rows::{COLUMNS5, ROWS5, columns8};
+use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters};
 use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
-use self::transpose::transpose16;
+use self::transpose::{transpose4, transpose16};
 use super::{
     IN_ORDER, LANES, Lanewise, Part, Simd, assert_indices, avx_doubles, one_piece, valid_indices, x86_token,
 };
@@ -133,6 +133,25 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn rows4(self, m: u16, from: &[[f32; 4]], row: U) -> [F; 4] {
+        let row = valid_indices(self, m, row, from.len());
+        // SAFETY: `valid_indices` returns indices of rows of the slice; unaligned loads.
+        unsafe {
+            macro_rules! load {
+                ($i:literal) => {
+                    _mm_loadu_ps(from.as_ptr().add(row[$i] as usize).cast())
+                };
+            }
+            // Four rows, each in a quarter of the lanes.
+            macro_rules! quarters {
+                ($($i:literal)*) => { concat_quarters(self, [$(load!($i)),*]) };
+            }
+            let (a, b) = (quarters!(0 4 8 12), quarters!(1 5 9 13));
+            let (c, d) = (quarters!(2 6 10 14), quarters!(3 7 11 15));
+            transpose4([a, b, c, d])
+        }
+    }
+    #[inline(always)]
     fn rows8(self, m: u16, from: &[[u32; 8]], row: U) -> [U; 8] {
         let row = valid_indices(self, m, row, from.len());
         // SAFETY: `valid_indices` returns indices of rows of the slice.
@@ -183,6 +202,44 @@ impl Simd for Avx512 {
         // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear
         // lanes are not accessed.
         unsafe { _mm512_mask_i32gather_epi32::<4>(_mm512_setzero_si512(), m, at, from.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn gather_pair(self, m: u16, from: &[[u32; 2]], at: U) -> (U, U) {
+        let at = valid_indices(self, m, at, from.len());
+        // SAFETY: `valid_indices` returns indices of elements of the slice; unaligned loads of
+        // eight bytes.
+        unsafe {
+            macro_rules! load {
+                ($i:literal) => {
+                    from.as_ptr().add(at[$i] as usize).cast()
+                };
+            }
+            // `two` loads two elements to a register of four lanes, and `quarters` two elements to
+            // each quarter of the lanes.
+            macro_rules! two {
+                ($a:literal $b:literal) => {
+                    _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(load!($a)), load!($b)))
+                };
+            }
+            macro_rules! quarters {
+                ($($a:literal $b:literal)*) => { concat_quarters(self, [$(two!($a $b)),*]) };
+            }
+            let (low, high) = (quarters!(0 1 4 5 8 9 12 13), quarters!(2 3 6 7 10 11 14 15));
+            let first = _mm512_shuffle_ps::<0b10_00_10_00>(low, high);
+            let second = _mm512_shuffle_ps::<0b11_01_11_01>(low, high);
+            (self.bits(first), self.bits(second))
+        }
+    }
+    #[inline(always)]
+    fn expand(self, a: F, m: u16, from: &[f32; LANES]) -> F {
+        // Expanding loads are slow on some machines, so the elements are loaded first.
+        // SAFETY: registers only.
+        unsafe { _mm512_mask_expand_ps(a, m, self.load(from)) }
+    }
+    #[inline(always)]
+    fn expand_u(self, a: U, m: u16, from: &[u32; LANES]) -> U {
+        // SAFETY: as `expand`.
+        unsafe { _mm512_mask_expand_epi32(a, m, self.load_u(from)) }
     }
     const HAS_FAST_COMPRESS: bool = true;
     #[inline(always)]

@@ -5,6 +5,16 @@ use super::transpose::transpose4;
 use crate::simd::{LANES, Lanewise};
 use std::arch::x86_64::*;
 
+/// Concatenates four registers of four lanes.
+#[inline(always)]
+pub(super) fn concat_quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m512 {
+    // SAFETY: the token proves the features, and only registers are accessed.
+    unsafe {
+        let four = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(a), b);
+        _mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(four, c), d)
+    }
+}
+
 /// Loads the rows with the indices `row` and transposes them, see [`crate::simd::Simd::rows8`].
 ///
 /// # Safety

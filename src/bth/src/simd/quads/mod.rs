@@ -16,7 +16,7 @@ pub(super) mod simd128;
 pub(super) mod sse4;
 
 use self::register::Register;
-use super::{IN_ORDER, LANES, Lanewise, Part, Simd, assert_indices, plain_doubles, scalar};
+use super::{IN_ORDER, LANES, Lanewise, Part, Simd, assert_indices, plain_doubles, scalar, valid_indices};
 
 /// Lanes of a register.
 const QUAD: usize = 4;
@@ -302,6 +302,10 @@ impl<Q: Quad> Simd for Quads<Q> {
         q.least(q.min(q.min(a[0], a[1]), q.min(a[2], a[3])))
     }
     #[inline(always)]
+    fn rows4(self, m: U<Q>, from: &[[f32; 4]], row: U<Q>) -> [F<Q>; 4] {
+        rows::rows4(self, from, indices(self, m, row))
+    }
+    #[inline(always)]
     fn rows8(self, m: U<Q>, from: &[[u32; 8]], row: U<Q>) -> [U<Q>; 8] {
         rows::rows8(self, from, indices(self, m, row))
     }
@@ -322,6 +326,12 @@ impl<Q: Quad> Simd for Quads<Q> {
         rows::least_of_each(self, rows)
     }
     #[inline(always)]
+    fn expand(self, a: F<Q>, m: U<Q>, from: &[f32; LANES]) -> F<Q> {
+        let mut words = [0; LANES];
+        self.store_u(self.bits(self.load(from)), &mut words);
+        self.floats(self.expand_u(self.bits(a), m, &words))
+    }
+    #[inline(always)]
     fn lookup_u(self, table: U<Q>, at: U<Q>) -> U<Q> {
         let (mut words, mut index, mut out) = ([0; LANES], [0; LANES], [0; LANES]);
         self.store_u(table, &mut words);
@@ -339,6 +349,19 @@ impl<Q: Quad> Simd for Quads<Q> {
             out[i] = from.get(index[i] as usize).copied().unwrap_or(0);
         }
         self.and_u(self.load_u(&out), m)
+    }
+    #[inline(always)]
+    fn gather_pair(self, m: U<Q>, from: &[[u32; 2]], at: U<Q>) -> (U<Q>, U<Q>) {
+        let index = valid_indices(self, m, at, from.len());
+        let (mut first, mut second) = ([0; LANES], [0; LANES]);
+        for i in 0..LANES {
+            [first[i], second[i]] = from[index[i] as usize];
+        }
+        (self.load_u(&first), self.load_u(&second))
+    }
+    #[inline(always)]
+    fn expand_u(self, a: U<Q>, m: U<Q>, from: &[u32; LANES]) -> U<Q> {
+        packing::expand(self, a, m, from)
     }
     #[inline(always)]
     fn compress(self, bits: u32, a: U<Q>, to: &mut [u32; LANES]) -> usize {

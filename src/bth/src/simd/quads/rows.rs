@@ -4,6 +4,23 @@ use super::register::Register;
 use super::{F, LANES, QUAD, QUADS, Quad, Quads, U, split_mut};
 use crate::simd::Lanewise;
 
+/// Implements [`crate::simd::Simd::rows4`] for indices of all lanes.
+#[inline(always)]
+pub(super) fn rows4<Q: Quad>(s: Quads<Q>, from: &[[f32; 4]], row: [u32; LANES]) -> [F<Q>; 4] {
+    let mut out = [s.splat(0.0); 4];
+    for i in 0..QUADS {
+        let mut block = [s.0.splat(0.0); QUAD];
+        for j in 0..QUAD {
+            block[j] = s.0.load(&from[row[QUAD * i + j] as usize]);
+        }
+        let block = s.0.transpose(block);
+        for k in 0..4 {
+            out[k][i] = block[k];
+        }
+    }
+    out
+}
+
 /// Implements [`crate::simd::Simd::rows8`] for indices of all lanes.
 #[inline(always)]
 pub(super) fn rows8<Q: Quad>(s: Quads<Q>, from: &[[u32; 8]], row: [u32; LANES]) -> [U<Q>; 8] {

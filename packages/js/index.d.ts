@@ -283,8 +283,8 @@ export interface Steps {
 }
 
 /**
- * The surface at each hit. A miss has NaN and 0xffffffff, and so has what the file does not keep: positions of a file compiled with
- * `--no-geometry`, texture coordinates without `--attributes`, materials without `--names` or `--materials`.
+ * The surface at each hit. A miss has NaN and 0xffffffff, and so has what the file does not keep: texture coordinates without
+ * `--attributes`, materials without `--names` or `--materials`.
  */
 export interface Surface<Numbers extends Float32Array | Float64Array = Float32Array> {
     readonly count: number;

@@ -78,7 +78,7 @@ impl Points<'_> {
                 let message = format!("triangle {triangle} of {}", object.header.triangles);
                 return Err(PyIndexError::new_err(message));
             }
-            if needs_geometry && object.triangles.is_empty() {
+            if needs_geometry && !object.has_corners() {
                 return Err(no_geometry());
             }
         }

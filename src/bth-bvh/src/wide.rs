@@ -9,7 +9,8 @@ use serde::Serialize;
 /// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wide {
-    /// Nodes in depth-first order, then leaves.
+    /// Nodes that lead to nodes, in depth-first order; then all other nodes, each followed by its
+    /// leaves. All nodes and then leaves where `leaf_vertices` are recorded.
     pub lines: Vec<CacheLine>,
     /// Ids of the leaves' triangles, in order of the leaves' lines.
     pub triangle_ids: Vec<u32>,

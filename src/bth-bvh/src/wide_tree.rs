@@ -12,13 +12,6 @@ use bth_import::error::{Error, Result};
 use bth_import::monitor::Monitor;
 use rayon::prelude::*;
 
-/// A wide node before its lines are written.
-struct Inner {
-    /// Its slots in `Writer::tree`'s list.
-    first: usize,
-    count: usize,
-}
-
 /// A slot that is not decided yet.
 struct Pending {
     slot: usize,
@@ -34,29 +27,43 @@ struct Slot {
     code: u32,
 }
 
-/// Leaves that one task writes.
-const LEAVES_AT_ONCE: usize = 1 << 10;
+/// Blocks that one task writes.
+const BLOCKS_AT_ONCE: usize = 1 << 10;
 
-/// A triangle leaf.
+/// What a slot leads to, but for tet leaves.
 #[derive(Clone, Copy)]
-struct Leaf {
-    /// Node of the binary BVH.
-    node: u32,
-    /// True if its triangles do not share vertices.
-    raw: bool,
+enum Block {
+    /// A wide node and the slots of its children.
+    Node { slot: usize, first: usize, count: usize, leads_to_nodes: bool },
+    /// A triangle leaf, raw if its triangles do not share vertices.
+    Leaf { slot: usize, raw: bool },
 }
 
-impl Leaf {
+impl Block {
+    fn slot(&self) -> usize {
+        match *self {
+            Block::Node { slot, .. } | Block::Leaf { slot, .. } => slot,
+        }
+    }
+
     fn lines(&self) -> usize {
-        if self.raw { RAW_LINES } else { INDEXED_LINES }
+        match self {
+            Block::Node { .. } => NODE_LINES,
+            Block::Leaf { raw: true, .. } => RAW_LINES,
+            Block::Leaf { raw: false, .. } => INDEXED_LINES,
+        }
     }
 
     fn child(&self, line: usize) -> Child {
-        if self.raw { Child::Raw(line as u32) } else { Child::Indexed(line as u32) }
+        match self {
+            Block::Node { .. } => Child::Node(line as u32),
+            Block::Leaf { raw: true, .. } => Child::Raw(line as u32),
+            Block::Leaf { raw: false, .. } => Child::Indexed(line as u32),
+        }
     }
 }
 
-/// What some leaves add behind their lines.
+/// What leaves add to the sections behind the lines.
 #[derive(Default)]
 struct WrittenLeaves {
     /// Ids of their triangles.
@@ -80,12 +87,36 @@ pub(super) struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Writes the tree, nodes before leaves. Returns the root's code.
+    /// Writes the tree. Returns the root's code.
+    ///
+    /// The nodes that lead to nodes come first: they are few, and most rays enter them. Each other
+    /// node is followed by its leaves, so that a ray reads neighbouring pages. Where the vertices
+    /// of leaves are recorded all nodes come first, which refitting relies on.
     pub(super) fn tree(&mut self) -> Result<u32> {
-        // First the shape is determined: slot 0 holds the root, every other slot belongs to a node.
+        let (mut slots, blocks) = self.shape();
+        let is_first = |block: &&Block| match block {
+            Block::Node { leads_to_nodes, .. } => self.leaf_vertices || *leads_to_nodes,
+            Block::Leaf { .. } => false,
+        };
+        let rest = blocks.iter().filter(|block| !is_first(block));
+        let blocks: Vec<Block> = blocks.iter().filter(is_first).chain(rest).copied().collect();
+        let mut next = 0;
+        for block in &blocks {
+            slots[block.slot()].code = block.child(next).code();
+            next += block.lines();
+            check_lines(next)?;
+        }
+        self.wide.lines = zeroed(next);
+        self.write(&slots, &blocks)?;
+        self.report(&slots, &blocks);
+        Ok(slots[0].code)
+    }
+
+    /// Determines the shape of the tree: its slots, the first of which holds the root while every
+    /// other belongs to a node, and its blocks in depth-first order.
+    fn shape(&mut self) -> (Vec<Slot>, Vec<Block>) {
         let mut slots = vec![Slot { node: 0, code: NONE }];
-        let mut inner: Vec<Inner> = Vec::new();
-        let mut leaves: Vec<usize> = Vec::new();
+        let mut blocks = Vec::new();
         let mut pending = vec![Pending { slot: 0, level: 0 }];
         while let Some(Pending { slot, level }) = pending.pop() {
             let at = slots[slot].node;
@@ -97,86 +128,71 @@ impl Writer<'_> {
                 continue;
             }
             if decision.role() != Role::Node {
-                leaves.push(slot);
+                blocks.push(Block::Leaf { slot, raw: decision.role() == Role::Raw });
                 continue;
             }
-            slots[slot].code = Child::Node((inner.len() * NODE_LINES) as u32).code();
             let first = slots.len();
             let mut children = children(self.bvh, self.decisions, at);
             self.slot_order.sort(&mut children);
+            let is_node = |child: &u32| {
+                let decision = self.decisions[*child as usize];
+                !decision.is_cut() && decision.role() == Role::Node
+            };
+            let leads_to_nodes = children.iter().any(is_node);
             slots.extend(children.into_iter().map(|node| Slot { node, code: NONE }));
-            inner.push(Inner { first, count: slots.len() - first });
+            blocks.push(Block::Node { slot, first, count: slots.len() - first, leads_to_nodes });
             self.wide.depth = self.wide.depth.max(level + 1);
-            self.report.node_visits += self.area(at);
             pending.extend((first..slots.len()).rev().map(|slot| Pending { slot, level: level + 1 }));
         }
-
-        // Leaves follow the nodes.
-        let leaves_from = inner.len() * NODE_LINES;
-        let mut next = leaves_from;
-        let mut placed = Vec::with_capacity(leaves.len());
-        for &slot in &leaves {
-            let node = slots[slot].node;
-            let leaf = Leaf { node, raw: self.decisions[node as usize].role() == Role::Raw };
-            slots[slot].code = leaf.child(next).code();
-            next += leaf.lines();
-            check_lines(next)?;
-            self.report.leaf_visits += self.area(node);
-            placed.push(leaf);
-        }
-        check_lines(next)?;
-
-        self.wide.lines = zeroed(next);
-        let widened = self.wide.widened_boxes;
-        let node_lines = self.wide.lines[..leaves_from].par_chunks_mut(NODE_LINES);
-        node_lines.zip(inner.par_iter()).for_each(|(lines, &Inner { first, count })| {
-            let slots =
-                slots[first..first + count].iter().map(|s| (&self.bvh.nodes[s.node as usize], s.code));
-            put(lines, 0, &wide_node(slots, widened));
-        });
-        self.leaves(&placed, leaves_from)?;
-        self.report.nodes += inner.len() as u64;
-        self.report.children += slots.len() as u64 - 1;
-        Ok(slots[0].code)
+        (slots, blocks)
     }
 
-    /// Writes triangle leaves, one behind the other from a line on, and their triangles' ids.
-    fn leaves(&mut self, leaves: &[Leaf], line: usize) -> Result<()> {
-        let count = |leaf: &Leaf| self.bvh.nodes[leaf.node as usize].count as usize;
-        let mut parts = Vec::with_capacity(leaves.len().div_ceil(LEAVES_AT_ONCE));
-        let mut lines = &mut self.wide.lines[line..];
+    /// Writes all blocks, one behind the other, and the ids of the triangles.
+    fn write(&mut self, slots: &[Slot], blocks: &[Block]) -> Result<()> {
+        let node_of = |slot: &Slot| &self.bvh.nodes[slot.node as usize];
+        let mut parts = Vec::with_capacity(blocks.len().div_ceil(BLOCKS_AT_ONCE));
+        let mut lines = &mut self.wide.lines[..];
         let mut first = self.wide.triangle_ids.len();
-        for leaves in leaves.chunks(LEAVES_AT_ONCE) {
+        for blocks in blocks.chunks(BLOCKS_AT_ONCE) {
             let own;
-            (own, lines) = lines.split_at_mut(leaves.iter().map(Leaf::lines).sum());
-            parts.push((leaves, own, first as u32));
-            first += leaves.iter().map(count).sum::<usize>();
+            (own, lines) = lines.split_at_mut(blocks.iter().map(Block::lines).sum());
+            parts.push((blocks, own, first as u32));
+            let leaves = blocks.iter().filter(|block| matches!(block, Block::Leaf { .. }));
+            first += leaves.map(|leaf| node_of(&slots[leaf.slot()]).count as usize).sum::<usize>();
         }
         let (mesh, bvh, monitor, recorded) = (self.mesh, self.bvh, self.monitor, self.leaf_vertices);
-        let write = |(leaves, lines, first): (&[Leaf], &mut [CacheLine], u32)| {
+        let widened = self.wide.widened_boxes;
+        let write = |(blocks, lines, first): (&[Block], &mut [CacheLine], u32)| {
             monitor.check()?;
             let mut written = WrittenLeaves::default();
             let mut at = 0;
-            for leaf in leaves {
-                let node = &bvh.nodes[leaf.node as usize];
+            for block in blocks {
+                let node = node_of(&slots[block.slot()]);
                 let ids = &bvh.order[node.first as usize..][..node.count as usize];
-                let first = first + written.ids.len() as u32;
-                written.ids.extend_from_slice(ids);
+                let row = first + written.ids.len() as u32;
                 let mut record = |rows: &[[u32; WIDTH]]| {
+                    written.ids.extend_from_slice(ids);
                     if recorded {
                         written.vertices.extend_from_slice(rows);
                     }
                 };
-                if leaf.raw {
-                    let (raw, rows) = raw_leaf(mesh, ids, first);
-                    put(lines, at, &raw);
-                    record(&rows);
-                } else {
-                    let (indexed, rows) = indexed_leaf(mesh, ids, first);
-                    put(lines, at, &indexed);
-                    record(&[rows]);
+                match *block {
+                    Block::Node { first, count, .. } => {
+                        let children = slots[first..first + count].iter().map(|s| (node_of(s), s.code));
+                        put(lines, at, &wide_node(children, widened));
+                    }
+                    Block::Leaf { raw: true, .. } => {
+                        let (leaf, rows) = raw_leaf(mesh, ids, row);
+                        put(lines, at, &leaf);
+                        record(&rows);
+                    }
+                    Block::Leaf { raw: false, .. } => {
+                        let (leaf, rows) = indexed_leaf(mesh, ids, row);
+                        put(lines, at, &leaf);
+                        record(&[rows]);
+                    }
                 }
-                at += leaf.lines();
+                at += block.lines();
             }
             Ok(written)
         };
@@ -185,21 +201,28 @@ impl Writer<'_> {
             self.wide.triangle_ids.extend(part.ids);
             self.wide.leaf_vertices.extend(part.vertices);
         }
-        for leaf in leaves {
-            let triangles = u64::from(self.bvh.nodes[leaf.node as usize].count);
-            let report = &mut *self.report;
-            let (leaves, in_them) = match leaf.raw {
-                true => (&mut report.raw_leaves, &mut report.raw_triangles),
-                false => (&mut report.indexed_leaves, &mut report.indexed_triangles),
-            };
-            *leaves += 1;
-            *in_them += triangles;
-        }
         Ok(())
     }
 
-    fn area(&self, at: u32) -> f64 {
-        self.weighed.area(at)
+    /// Counts the blocks and what rays visit of them.
+    fn report(&mut self, slots: &[Slot], blocks: &[Block]) {
+        self.report.children += slots.len() as u64 - 1;
+        for block in blocks {
+            let at = slots[block.slot()].node;
+            let (area, report) = (self.weighed.area(at), &mut *self.report);
+            let (leaves, in_them) = match block {
+                Block::Node { .. } => {
+                    report.nodes += 1;
+                    report.node_visits += area;
+                    continue;
+                }
+                Block::Leaf { raw: true, .. } => (&mut report.raw_leaves, &mut report.raw_triangles),
+                Block::Leaf { raw: false, .. } => (&mut report.indexed_leaves, &mut report.indexed_triangles),
+            };
+            report.leaf_visits += area;
+            *leaves += 1;
+            *in_them += u64::from(self.bvh.nodes[at as usize].count);
+        }
     }
 }
 

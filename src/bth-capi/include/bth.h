@@ -368,8 +368,8 @@ int32_t bth_triangles_in_box_f64(const bth_scene *scene, const double lower[3], 
 int32_t bth_triangles_in_sphere_f64(const bth_scene *scene, const double center[3], double radius, bth_surface *triangles,
                                     size_t capacity, size_t *count);
 
-/* What hits lead to. A file keeps the positions of triangles by default (not with `bthc compile --no-geometry`), normals and texture
- * coordinates with --attributes, and groups, materials and names with --names. */
+/* What hits lead to. A file keeps the corners of triangles that can be hit, normals and texture coordinates with --attributes, and
+ * groups, materials and names with --names. */
 
 /* Version of the library, such as "0.9.0". Valid forever. */
 const char *bth_version(void);
@@ -385,8 +385,8 @@ uint32_t bth_object_count(const bth_scene *scene);
 uint32_t bth_group_count(const bth_scene *scene, uint32_t object);
 uint32_t bth_material_count(const bth_scene *scene, uint32_t object);
 
-/* Stores the three vertices of a triangle in world space, at the scene's time. Returns BTH_OK; BTH_ERROR_MISSING if the file does
- * not keep them; BTH_ERROR_ARGUMENT if there is no such instance or triangle. */
+/* Stores the three vertices of a triangle in world space, at the scene's time. Returns BTH_OK; BTH_ERROR_MISSING for a
+ * triangle without area in a file without geometry; BTH_ERROR_ARGUMENT if there is no such instance or triangle. */
 int32_t bth_triangle_positions(const bth_scene *scene, bth_surface triangle, double positions[3][3]);
 
 /* Flag of bth_surface_point: the file has texture coordinates. */
@@ -406,7 +406,7 @@ typedef struct {
 } bth_surface_point;
 
 /* Stores the surface at a hit of this scene, at the scene's time, in *point. Returns BTH_OK; BTH_ERROR_ARGUMENT for a miss;
- * BTH_ERROR_MISSING if the file does not keep the positions of triangles, or the instance is hidden by now. */
+ * BTH_ERROR_MISSING if the triangle has no area, or the instance is hidden by now. */
 int32_t bth_surface_at(const bth_scene *scene, const bth_hit *hit, bth_surface_point *point);
 
 /* Copy the name of an object, or of a group or material of an object, to `name`, in UTF-8 with a zero at the end; where it does not fit

@@ -74,8 +74,8 @@ fn no_triangle(scene: &Scene, primitive: PrimitiveRef) -> (i32, String) {
         return error;
     }
     let PrimitiveRef { instance, triangle } = primitive;
-    if scene.object(scene.object_of(instance)).triangles.is_empty() {
-        let text = "the file has no positions of triangles; compile it without --no-geometry".to_owned();
+    if !scene.object(scene.object_of(instance)).has_corners() {
+        let text = "the file has no positions of triangles; compile it again".to_owned();
         return (ERROR_MISSING, text);
     }
     (ERROR_MISSING, format!("instance {instance} is hidden, or triangle {triangle} has no area"))

@@ -2,12 +2,12 @@
 //! the sections of the source that a file keeps. The queries are methods of [`Scene`]
 //! (`hits/mod.rs`).
 //!
-//! Compiling decides what a file keeps: positions of triangles by default (not with
-//! `--no-geometry`), normals and texture coordinates with `--attributes`, groups, materials and
-//! names with `--names`, how materials look with `--materials`.
+//! The corners of a triangle come from its leaf. Compiling decides what else a file keeps: normals
+//! and texture coordinates with `--attributes`, groups, materials and names with `--names`, how
+//! materials look with `--materials`.
 
 use crate::animation::normals::corner_normal;
-use crate::intersect::start::source_corners;
+use crate::intersect::start::corners_by_id;
 use crate::materials::{Alpha, Gloss, Material, Texture, Wrap};
 use crate::rays::{Hit, PrimitiveRef};
 use crate::scene::Scene;
@@ -59,7 +59,7 @@ pub(crate) fn surface_at(scene: &Scene, hit: &Hit) -> Option<SurfacePoint> {
         return None;
     }
     let view = scene.object(object);
-    let corners = source_corners(&view, id)?;
+    let corners = corners_by_id(&view, id)?;
     let (u, v) = (f64::from(hit.u), f64::from(hit.v));
     let weights = [1.0 - u - v, u, v];
     let object_position = weighted(weights, corners);

@@ -69,13 +69,18 @@ fn json_reports_time_and_rays() {
 }
 
 #[test]
-fn modes_that_need_normals_say_that_the_file_has_no_geometry() {
+fn files_without_geometry_look_the_same_but_for_smooth_normals() {
     let folder = folder(&[("ball.obj", &sphere(16))]);
-    bthc(folder.path(), &["compile", "ball.obj", "--no-geometry"]).expect(0);
-    let refused = play(folder.path(), &[]).expect(3);
-    assert!(refused.stderr.contains("--no-geometry") && refused.stderr.contains("BTH-P001"), "{refused:?}");
-    assert!(!folder.path().join("out.png").exists());
-    play(folder.path(), &["--mode", "steps"]).expect(0);
+    let mut pictures = Vec::new();
+    for options in [&[][..], &["--no-geometry"]] {
+        bthc(folder.path(), &[&["compile", "ball.obj"][..], options].concat()).expect(0);
+        for mode in ["shaded", "ao", "path"] {
+            play(folder.path(), &["--mode", mode, "--smooth", "0"]).expect(0);
+            pictures.push(std::fs::read(folder.path().join("out.png")).expect("a picture"));
+        }
+    }
+    let (whole, bare) = pictures.split_at(3);
+    assert!(whole == bare && whole[0] != whole[1]);
 }
 
 #[test]

@@ -187,10 +187,14 @@ fn what_a_file_does_not_keep_is_absent() {
     );
     assert_eq!((scene.group_count(0), scene.group_name(0, 0), scene.material_count(0)), (1, "", 0));
 
+    let plain = scene;
     let nothing = CompileOptions { geometry: false, ..options() };
     let scene = bth::from_bytes(&compiled(&model, &nothing)).unwrap();
     let hit = ray(&scene, &mut rng);
-    assert_eq!((scene.surface(&hit), scene.triangle(hit.primitive)), (None, None));
+    // The leaf of the triangle has its corners.
+    let (of_leaf, whole) = (scene.surface(&hit).unwrap(), plain.surface(&hit).unwrap());
+    assert_eq!((of_leaf.position, of_leaf.geometric_normal), (whole.position, whole.geometric_normal));
+    assert_eq!(scene.triangle(hit.primitive), plain.triangle(hit.primitive));
     let group = scene.group_of(0, hit.primitive.triangle);
     assert_eq!(scene.group_name(0, group), model.parts[hit.primitive.triangle as usize].0);
 

@@ -55,7 +55,7 @@ pub(super) struct Collapse<'a> {
 impl Stage for Collapse<'_> {
     type Output = (Object, bvh::CollapseReport);
     const NAME: &'static str = "collapse";
-    const VERSION: &'static str = "5";
+    const VERSION: &'static str = "6";
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         let Self { traced, leaves, free, motion, options } = self;

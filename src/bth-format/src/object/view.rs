@@ -136,6 +136,13 @@ impl<'a> ObjectView<'a> {
         exact.unwrap_or_else(|| of_leaf.map(|corner| corner.map(f64::from)))
     }
 
+    /// Returns true if the corners of each triangle that a ray can hit are known by its id: from
+    /// its leaf or from the source.
+    pub fn has_corners(&self) -> bool {
+        let rows = [self.triangles.len(), self.places.len()];
+        rows.contains(&(self.header.triangles as usize))
+    }
+
     /// Returns true if child boxes are widened ([`WIDENED_BOXES`]).
     pub fn has_widened_boxes(&self) -> bool {
         self.header.coordinates & WIDENED_BOXES != 0

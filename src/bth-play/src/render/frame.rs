@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::io::IsTerminal;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Time and work of a frame: the sums over the times at which the scene is sampled.
@@ -95,10 +96,7 @@ impl FrameRenderer<'_> {
             let camera = self.setup.camera(scene, self.args);
             let frame = FrameContext::new(scene, self.file, self.setup, camera, self.args)?;
             let start = Instant::now();
-            for tile in self.tiles(&frame, &exposure, &rendered) {
-                tile.add_to(&mut sums, &rendered);
-                total += tile.counters;
-            }
+            self.add_squares(&frame, &exposure, &rendered, (&mut sums, &mut total));
             report.seconds += start.elapsed().as_secs_f64();
         }
         let camera_rays = pixels as u64 * u64::from(self.args.spp);
@@ -112,20 +110,25 @@ impl FrameRenderer<'_> {
         Ok((picture.part(corner, part.size()), report))
     }
 
-    /// All tiles of a region at the time to which the scene is set.
-    fn tiles(&self, frame: &FrameContext<'_>, exposure: &Exposure, region: &Region) -> Vec<Tile> {
-        let shader = Shader::new(frame);
-        let render = |number: u32| {
+    /// Renders the squares of a region at the time to which the scene is set, and adds them to its
+    /// pixels. Threads take one square after the other, so that all work in the same part of the
+    /// picture and read the same part of the scene.
+    fn add_squares(
+        &self,
+        frame: &FrameContext<'_>,
+        exposure: &Exposure,
+        region: &Region,
+        to: (&mut [Shaded], &mut Counters),
+    ) {
+        let (shader, to) = (Shader::new(frame), Mutex::new(to));
+        region.squares(self.args.size.0).into_iter().par_bridge().for_each(|number| {
             let tile = render_tile(frame, number, exposure, &shader);
             self.progress.tile_done();
-            tile
-        };
-        // Threads take one square after the other, so that all work in the same part of the picture
-        // and read the same part of the scene.
-        let squares = region.squares(self.args.size.0).into_iter().enumerate().par_bridge();
-        let mut tiles: Vec<(usize, Tile)> = squares.map(|(at, square)| (at, render(square))).collect();
-        tiles.sort_unstable_by_key(|(at, _)| *at);
-        tiles.into_iter().map(|(_, tile)| tile).collect()
+            // Squares have no pixels in common, and counts are whole numbers: their order is free.
+            let (pixels, total) = &mut *to.lock().unwrap_or_else(PoisonError::into_inner);
+            tile.add_to(pixels, region);
+            **total += tile.counters;
+        });
     }
 }
 

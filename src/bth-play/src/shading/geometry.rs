@@ -1,4 +1,4 @@
-//! Normals at hits, computed from the source geometry that the file keeps, in world space.
+//! Normals at hits, computed from the corners of triangles, in world space.
 
 use crate::failure::Failure;
 use crate::smooth::SmoothNormals;
@@ -40,16 +40,16 @@ impl<'a> ShadingGeometry<'a> {
         }
     }
 
-    /// Fails when the file was compiled without the source's positions and triangles, which normals
-    /// need.
+    /// Fails when the file tells neither the places of triangles in leaves nor their positions in
+    /// the source, of which normals need one.
     pub(crate) fn require_triangles(&self, file: &Path) -> Result<(), Failure> {
-        if self.objects.iter().all(|view| view.triangles.len() == view.header.triangles as usize) {
+        if self.objects.iter().all(ObjectView::has_corners) {
             return Ok(());
         }
         Err(Failure::Lacks {
             file: file.into(),
-            what: "the file has no positions and triangles, which this mode needs for normals",
-            hint: "compile the model without --no-geometry, or use --mode steps",
+            what: "the file tells neither places nor positions of triangles, which normals need",
+            hint: "compile the model again, or use --mode steps",
         })
     }
 
@@ -91,9 +91,7 @@ impl<'a> ShadingGeometry<'a> {
     /// The unit normal of a triangle's plane in the world on the side of its front; `None` where it
     /// cannot be computed.
     fn front_normal(&self, primitive: PrimitiveRef) -> Option<DVec3> {
-        let object = self.object(primitive);
-        let [a, b, c] =
-            object.triangles[primitive.triangle as usize].map(|v| to_f64(object.positions[v as usize]));
+        let [a, b, c] = self.scene.triangle(primitive)?.map(DVec3::from_array);
         let (e, f) = (b - a, c - a);
         // Scaled first: the square of the cross product of two edges of 1e-20 underflows in f64.
         let scale = e.abs().max_element().max(f.abs().max_element());

@@ -23,7 +23,7 @@ pub use crossings::Crossings;
 
 use self::crossings::count_crossings;
 use self::results::{append_all, append_each, append_nearest, store_each};
-use crate::intersect::start::source_corners;
+use crate::intersect::start::corners_by_id;
 use crate::masks::Masks;
 use crate::materials::{Material, Texture};
 use crate::rays::{Hit, PrimitiveRef};
@@ -246,10 +246,12 @@ impl Scene {
 /// What a file keeps of the surface at a hit.
 impl Scene {
     /// The vertices of a triangle in the space of its object, as rays are tested against them: on
-    /// the grid, if the file has one, or the positions in f64. `None` if the file does not keep
-    /// them (it was compiled with `--no-geometry`), or if there is no such instance or triangle.
+    /// the grid, if the file has one, or the positions in f64. They are read from the leaf of the
+    /// triangle, which a ray that hit it has read, too. Triangles that no ray can hit are in no
+    /// leaf: they are read from the source, and are `None` with `--no-geometry`. `None` if there is
+    /// no such instance or triangle.
     pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
-        source_corners(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
+        corners_by_id(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
     }
 
     /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they
@@ -260,9 +262,8 @@ impl Scene {
         Some(corners.map(|corner| surface::transformed(&to_world, corner)))
     }
 
-    /// The surface at a hit of this scene, at the scene's time. `None` for a miss, if the file does
-    /// not keep the vertices of triangles (it was compiled with `--no-geometry`), if there is no
-    /// such instance or triangle, or if the instance is hidden by now.
+    /// The surface at a hit of this scene, at the scene's time. `None` for a miss, where
+    /// [`Self::triangle`] is `None`, or if the instance is hidden by now.
     ///
     /// ```
     /// use bth::rays::Ray;

@@ -27,6 +27,7 @@ mod bvh;
 mod clock;
 mod coherence;
 mod enumerate;
+mod fetch;
 mod hits;
 mod instances;
 mod intersect;

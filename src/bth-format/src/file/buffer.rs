@@ -103,6 +103,20 @@ impl Buffer {
         matches!(self, Buffer::Mapped(_, true))
     }
 
+    /// Asks the system to read bytes from an address on, if they are of a file that is paged.
+    pub(super) fn will_need(&self, address: usize, length: usize) {
+        #[cfg(unix)]
+        if let Buffer::Mapped(map, true) = self
+            && let Some(first) = address.checked_sub(map.as_ptr().addr())
+            && first + length <= map.len()
+        {
+            // The advice may be refused: then the bytes are read when they are needed.
+            let _ = map.advise_range(memmap2::Advice::WillNeed, first, length);
+        }
+        #[cfg(not(unix))]
+        let _ = (address, length);
+    }
+
     /// Copies the bytes of a file.
     pub(super) fn copy(bytes: &[u8]) -> Result<Self> {
         let mut owned = Owned::zeroed(bytes.len()).ok_or_else(|| Error::memory(bytes.len() as u64))?;

@@ -136,6 +136,12 @@ impl File {
         self.buffer.is_paged()
     }
 
+    /// Asks the system to read rows of this file before they are needed, and returns at once. Does
+    /// nothing unless the file [is paged](Self::is_paged).
+    pub fn will_need<T>(&self, rows: &[T]) {
+        self.buffer.will_need(rows.as_ptr().addr(), size_of_val(rows));
+    }
+
     fn new(buffer: Buffer) -> Result<Self> {
         if cfg!(target_endian = "big") {
             return Err(Error::at(Code::Host, 0, "a little-endian machine", "a big-endian one"));

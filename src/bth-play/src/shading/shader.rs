@@ -48,6 +48,7 @@ impl<'a> Shader<'a> {
         counters: &mut Counters,
     ) -> Vec<Shaded> {
         let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray.to_ray()).collect();
+        fetch(frame, &rays);
         if let Shader::Steps = self {
             let steps = surface_modes::steps(frame.scene, &rays, &mut counters.steps);
             return steps.into_iter().map(Shaded::plain).collect();
@@ -66,5 +67,17 @@ impl<'a> Shader<'a> {
             Shader::Steps => unreachable!("handled above"),
         };
         colors.into_iter().map(Shaded::plain).collect()
+    }
+}
+
+/// Of so many camera rays of a square one is traced before the others, to read what lies around its
+/// hit.
+const SPARSE: usize = 64;
+
+/// Reads ahead for camera rays that are close to each other, where the file does not fit in memory.
+fn fetch(frame: &FrameContext<'_>, rays: &[Ray]) {
+    if frame.scene.file().is_paged() {
+        let hits = rays.iter().step_by(SPARSE).filter_map(|ray| frame.scene.nearest(ray));
+        hits.for_each(|hit| frame.scene.fetch_around(hit.primitive));
     }
 }

@@ -29,8 +29,7 @@ fn mesh(model: &Model) -> TriangleMesh<'_> {
 /// Options that lead through different stages, those with tetrahedra where the worker exists.
 fn all_options() -> Vec<(&'static str, CompileOptions)> {
     let bvh = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
-    let mut fast = bvh.clone();
-    fast.bvh.quality = bth_compile::bvh::Quality::Fast;
+    let fast = CompileOptions::fast();
     let bits = CoordinateOptions { bits: Some(GridBits::B16), ..CoordinateOptions::default() };
     let grid = CompileOptions { coordinates: bits, geometry: false, ..bvh.clone() };
     let tets = bth_tests::structures::options(Structure::Bth);

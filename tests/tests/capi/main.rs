@@ -264,8 +264,7 @@ fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
 
     let (positions, triangles) = hills();
     let hills = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
-    let mut options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
-    options.bvh.quality = bth_compile::bvh::Quality::Fast;
+    let options = CompileOptions::fast();
     let (compiled, _) = compile(hills, &options, &Silent).expect("it compiles");
     assert!(std::fs::read(mesh).expect("a file") == compiled.bytes);
     let instance = |z| Instance { mesh: 0, to_world: [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., z]] };

@@ -6,25 +6,24 @@
 use super::object::{Collapse, Compiled};
 use super::provenance;
 use super::traced::TracedMesh;
-use crate::bvh::{self, BvhOptions, Quality};
+use crate::bvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::options::{CompileOptions, Structure};
+use crate::options::CompileOptions;
 use crate::source::{MESH_NAME, SourceDigest, TriangleMesh};
 use crate::stage::Stage;
 use bth_files::Digest;
 use bth_import::{ImageFile, Mesh, import_bytes, import_images_bytes, import_triangles};
 use std::path::Path;
 
-/// Compiles a mesh as [`compile`](super::compile) does with [`Structure::Bvh`], [`Quality::Fast`]
-/// and without free directions: the same bytes. `deformable` keeps what new positions at run time
-/// need.
+/// Compiles a mesh as [`compile`](super::compile) does with [`CompileOptions::fast`]: the same
+/// bytes. `deformable` keeps what new positions at run time need.
 ///
 /// # Errors
 /// The errors of [`compile`](super::compile).
 pub fn compile_fast(mesh: TriangleMesh<'_>, deformable: bool, monitor: &dyn Monitor) -> Result<Compiled> {
-    let bvh = BvhOptions { quality: Quality::Fast, keep_zero_area: deformable };
-    let options = CompileOptions { structure: Structure::Bvh, deformable, bvh, ..CompileOptions::default() };
+    let mut options = CompileOptions { deformable, ..CompileOptions::fast() };
+    options.bvh.keep_zero_area = deformable;
     let digest = SourceDigest::of_triangles(mesh);
     let TriangleMesh { positions, triangles } = mesh;
     let (mesh, report) =
@@ -55,15 +54,7 @@ pub fn compile_model_fast(name: &Path, bytes: &[u8], monitor: &dyn Monitor) -> R
 
 /// The options of [`compile_model_fast`]: a BVH of quality fast, and materials.
 pub fn fast_model() -> CompileOptions {
-    let bvh = BvhOptions { quality: Quality::Fast, keep_zero_area: false };
-    let (materials, lenient_materials) = (true, true);
-    CompileOptions {
-        structure: Structure::Bvh,
-        bvh,
-        materials,
-        lenient_materials,
-        ..CompileOptions::default()
-    }
+    CompileOptions { materials: true, lenient_materials: true, ..CompileOptions::fast() }
 }
 
 /// Builds the tree of a mesh and the file. Its textures refer to `images`.
@@ -99,9 +90,7 @@ mod tests {
             for triangles in [&triangles[..], &[]] {
                 for deformable in [false, true] {
                     let mesh = TriangleMesh { positions, triangles };
-                    let mut options =
-                        CompileOptions { structure: Structure::Bvh, deformable, ..CompileOptions::default() };
-                    options.bvh.quality = Quality::Fast;
+                    let options = CompileOptions { deformable, ..CompileOptions::fast() };
                     let (expected, _) = compile(mesh, &options, &Silent).unwrap();
                     assert_eq!(compile_fast(mesh, deformable, &Silent).unwrap(), expected);
                 }

@@ -90,6 +90,32 @@ pub struct BvhReport {
     pub treelets: Vec<u64>,
 }
 
+impl BvhReport {
+    fn measure(&mut self, bvh: &BinaryBvh) {
+        self.nodes = bvh.nodes.len() as u64;
+        self.levels = levels(bvh);
+    }
+
+    /// Adds the report on a part of a mesh, where rays enter the box of this share of the area.
+    pub fn add(&mut self, part: &BvhReport, share: f64) {
+        self.triangles += part.triangles;
+        self.nodes += part.nodes;
+        self.levels = self.levels.max(part.levels);
+        sum_up(&mut self.visits, part.visits.iter().map(|visits| visits * share));
+        sum_up(&mut self.moved, part.moved.iter().copied());
+        sum_up(&mut self.treelets, part.treelets.iter().copied());
+    }
+}
+
+/// Adds values row by row.
+fn sum_up<T: Default + Clone + std::ops::AddAssign>(
+    sums: &mut Vec<T>,
+    values: impl ExactSizeIterator<Item = T>,
+) {
+    sums.resize(sums.len().max(values.len()), T::default());
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+}
+
 /// Builds the binary BVH of all triangles, down to single triangles. Skips triangles of zero area
 /// unless the options keep them. The result depends on mesh and options alone, not on the number of
 /// threads.
@@ -108,15 +134,40 @@ pub(super) fn build_with(
     keep_zero_area: bool,
     monitor: &dyn Monitor,
 ) -> Result<(BinaryBvh, BvhReport)> {
-    over_used(mesh, keep_zero_area, |used, report| {
-        let reference = |&id: &u32| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id };
-        let bvh = split_all(used.par_iter().map(reference).collect(), effort, monitor)?;
-        report.visits.push(visits(&bvh));
-        if effort.reinsertion.is_empty() || bvh.nodes.len() <= 3 {
-            return Ok(bvh);
-        }
-        reinsert(LinkedTree::new(&bvh), bvh, &effort.reinsertion, report, monitor)
-    })
+    over_used(mesh, keep_zero_area, |used, report| build_over(mesh, &used, effort, report, monitor))
+}
+
+/// Builds the tree of some triangles of a mesh, at least one, which has been checked
+/// ([`Parts::of`](super::Parts::of)).
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn build_part(
+    mesh: &Mesh,
+    ids: &[u32],
+    quality: Quality,
+    monitor: &dyn Monitor,
+) -> Result<(BinaryBvh, BvhReport)> {
+    let mut report = BvhReport { triangles: ids.len() as u64, ..BvhReport::default() };
+    let bvh = build_over(mesh, ids, &quality.effort(), &mut report, monitor)?;
+    report.measure(&bvh);
+    Ok((bvh, report))
+}
+
+fn build_over(
+    mesh: &Mesh,
+    ids: &[u32],
+    effort: &Effort,
+    report: &mut BvhReport,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    let reference = |&id: &u32| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id };
+    let bvh = split_all(ids.par_iter().map(reference).collect(), effort, monitor)?;
+    report.visits.push(visits(&bvh));
+    if effort.reinsertion.is_empty() || bvh.nodes.len() <= 3 {
+        return Ok(bvh);
+    }
+    reinsert(LinkedTree::new(&bvh), bvh, &effort.reinsertion, report, monitor)
 }
 
 /// Builds the tree by `build`, which gets the ids of the triangles to hold, at least one.
@@ -137,8 +188,7 @@ pub(super) fn over_used(
         return Ok((BinaryBvh::default(), report));
     }
     let bvh = build(used, &mut report)?;
-    report.nodes = bvh.nodes.len() as u64;
-    report.levels = levels(&bvh);
+    report.measure(&bvh);
     Ok((bvh, report))
 }
 
@@ -182,7 +232,7 @@ pub(super) fn reinsert<E: Extent>(
     Ok(tree.into_preorder(bvh))
 }
 
-fn check_mesh(mesh: &Mesh) -> Result<()> {
+pub(super) fn check_mesh(mesh: &Mesh) -> Result<()> {
     let internal = |message: String| Err(Error::Internal { code: "BTH-X201", message });
     if mesh.triangles.len() > bth_format::limits::MAX_TRIANGLES as usize {
         return Err(Error::Limit {

@@ -7,7 +7,7 @@ use super::slot_order::SlotOrder;
 use super::wide::{CollapseReport, Wide};
 use super::wide_lines::greatest_coordinate;
 use super::wide_tree::Writer;
-use super::{BinaryBvh, MAX_LEVELS};
+use super::{BinaryBvh, MAX_LEVELS, Node};
 use bth_format::layout::NONE;
 use bth_format::object::{WIDENED_RANGE, far_away};
 use bth_import::Mesh;
@@ -21,6 +21,8 @@ pub struct CollapseOptions {
     pub leaf_vertices: bool,
     /// Costs by which the tree is chosen.
     pub costs: Costs,
+    /// A node over all of the object, if the tree is of a part of it ([`Parts`](super::Parts)).
+    pub whole: Option<Node>,
 }
 
 /// Collapses a binary BVH to the nodes and leaves of the file, chosen by the nodes' areas or by
@@ -45,11 +47,12 @@ pub fn collapse<'a>(
         return Err(Error::Internal { code: "BTH-X203", message });
     }
     monitor.stage("collapse", None);
-    let greatest = bvh.nodes.first().map_or(0.0, greatest_coordinate);
+    let object = options.whole.as_ref().or(bvh.nodes.first());
+    let greatest = object.map_or(0.0, greatest_coordinate);
     // Readers compute the boxes of a deforming object again and do not widen them. For an object
     // that is far from the origin, widening would be large for its size, and readers need not allow
     // for it.
-    let is_far = bvh.nodes.first().is_some_and(|root| far_away(&root.lower, &root.upper).is_some());
+    let is_far = object.is_some_and(|root| far_away(&root.lower, &root.upper).is_some());
     let widened_boxes = !options.leaf_vertices && !is_far && WIDENED_RANGE.contains(&greatest);
     let mut wide = Wide { root: NONE, widened_boxes, ..Wide::default() };
     let mut report = CollapseReport::default();
@@ -102,7 +105,7 @@ fn check_cut(bvh: &BinaryBvh, cut: &[u32]) -> Result<()> {
     Ok(())
 }
 
-fn check_depth(depth: u32) -> Result<()> {
+pub(super) fn check_depth(depth: u32) -> Result<()> {
     const { assert!(MAX_LEVELS as usize <= bth_format::limits::MAX_DEPTH) };
     if depth as usize <= bth_format::limits::MAX_DEPTH {
         return Ok(());

@@ -4,6 +4,9 @@
 //! lower cost. [`rebuild_treelets()`] rebuilds small parts of the tree where the wide tree then
 //! costs less. [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
 //!
+//! [`Parts`] splits a mesh that is too large to be built at once; [`join()`] joins the wide trees of
+//! its parts.
+//!
 //! [`build_poses()`] builds one tree for several poses of a mesh that deforms, with the cost summed
 //! over them.
 //!
@@ -20,6 +23,7 @@ mod build_poses;
 mod collapse;
 mod extent;
 mod linked_tree;
+mod parts;
 mod places;
 mod plan;
 mod pose_bounds;
@@ -43,9 +47,10 @@ pub mod testing;
 mod validate;
 
 use build::visits;
-pub use build::{BvhOptions, BvhReport, Effort, Quality, build};
+pub use build::{BvhOptions, BvhReport, Effort, Quality, build, build_part};
 pub use build_poses::{PoseOptions, build_poses};
 pub use collapse::{CollapseOptions, collapse};
+pub use parts::{Part, Parts, join};
 pub use places::triangle_places;
 pub use plan::Costs;
 pub use poses::{Poses, Weighed};

@@ -60,6 +60,19 @@ pub struct CollapseReport {
 }
 
 impl CollapseReport {
+    /// Adds the report on a part of a tree, whose box rays enter with this probability.
+    pub(super) fn add(&mut self, part: &CollapseReport, share: f64) {
+        self.nodes += part.nodes;
+        self.children += part.children;
+        self.indexed_leaves += part.indexed_leaves;
+        self.indexed_triangles += part.indexed_triangles;
+        self.raw_leaves += part.raw_leaves;
+        self.raw_triangles += part.raw_triangles;
+        self.cost += part.cost * share;
+        self.node_visits += part.node_visits * share;
+        self.leaf_visits += part.leaf_visits * share;
+    }
+
     /// Sets the counts of bytes.
     pub fn measure(&mut self, wide: &Wide) {
         self.bytes = 64 * wide.lines.len() as u64 + 4 * wide.triangle_ids.len() as u64;

@@ -183,7 +183,7 @@ pub(crate) fn finish(
 ) -> Result<(Mesh, Report)> {
     let count = frames.as_ref().map_or(1, |frames| frames.positions.len() as u64);
     check_triangles(raw.triangles.len() as u64)?;
-    check_memory(raw.triangles.len() as u64, BYTES_PER_TRIANGLE - READ_PER_TRIANGLE)?;
+    check_memory(raw.triangles.len() as u64, BYTES_PER_TRIANGLE - READ_PER_TRIANGLE, true)?;
     check_rows((raw.positions.len() as u64).saturating_mul(count))?;
     let moves = frames.is_some() || raw.deformation.is_some();
     let rounded = match &frames {

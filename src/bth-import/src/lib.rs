@@ -57,7 +57,7 @@ pub use mesh::{
     TriangleOpacities, Wanted,
 };
 pub use monitor::{Monitor, Silent};
-pub use room::{BYTES_PER_TRIANGLE, check_memory};
+pub use room::{BYTES_PER_TRIANGLE, TRIANGLES_AT_ONCE, check_memory};
 pub use sequence::{
     MAX_FRAMES, Timing, VertexCache, import_sequence, import_sequence_bytes, import_vertex_cache,
     import_vertex_cache_bytes, read_vertex_cache, sequence_files,

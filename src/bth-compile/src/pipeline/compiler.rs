@@ -7,7 +7,8 @@ use super::hashed::Hashed;
 use super::import::Import;
 use super::marks::Mark;
 use super::moving::{self, BuildPoses, PoseSource, warn_of_options};
-use super::object::{Collapse, Object};
+use super::object::{Collapse, Object, ObjectSource};
+use super::parts::{BuildInParts, in_parts};
 use super::place::PlaceOnGrid;
 use super::provenance;
 use super::report::{CompileReport, StageReports, TetReports};
@@ -93,7 +94,8 @@ impl<'a> Compiler<'a> {
         self.options.check()?;
         // Of the memory for a triangle its mesh has some already.
         let more = if self.options.bvh.quality == Quality::Fast { 0 } else { 40 };
-        mesh::check_memory(mesh.triangles.len() as u64, mesh::BYTES_PER_TRIANGLE - 20 + more)?;
+        let (triangles, each) = (mesh.triangles.len(), mesh::BYTES_PER_TRIANGLE - 20 + more);
+        mesh::check_memory(triangles as u64, each, in_parts(triangles, self.options))?;
         if let Some(sequence) = mesh.sequence.clone() {
             warn_of_options(&self.source.display().to_string(), self.options, self.monitor);
             let options = &self.options.of_deforming();
@@ -124,6 +126,9 @@ impl<'a> Compiler<'a> {
         hash: &OnceCell<Digest>,
     ) -> Result<(Object, StageReports)> {
         let options = self.options;
+        if in_parts(mesh.triangles.len(), options) {
+            return self.in_parts(mesh, on_grid);
+        }
         let built =
             BuildTree { mesh: Hashed { mesh: &mesh, known: hash }, options: TreeOptions::of(options) };
         let (tree, bvh) = self.fetch(built)?;
@@ -137,6 +142,24 @@ impl<'a> Compiler<'a> {
         let coordinates = traced.on_grid.as_ref().map(crate::coordinates::OnGrid::report);
         let (object, collapse) = self.run(Collapse { traced, leaves, free, motion: None, options })?;
         Ok((object, StageReports { coordinates, bvh, free: free_report, tets, collapse }))
+    }
+
+    /// Compiles a mesh that does not move in parts.
+    fn in_parts(
+        mut self,
+        mesh: Mesh,
+        on_grid: Option<crate::coordinates::OnGrid>,
+    ) -> Result<(Object, StageReports)> {
+        let (options, most) = (TreeOptions::of(self.options), mesh::TRIANGLES_AT_ONCE as usize);
+        let (mut hierarchy, bvh, mut collapse) = self.run(BuildInParts { mesh: &mesh, options, most })?;
+        if let Some(on_grid) = &on_grid {
+            crate::coordinates::pack(&mut hierarchy.wide, &on_grid.grid)?;
+            collapse.measure(&hierarchy.wide);
+        }
+        let coordinates = on_grid.as_ref().map(crate::coordinates::OnGrid::report);
+        let source = ObjectSource { mesh, on_grid, free: None, motion: None };
+        let object = Object::new(source, hierarchy, Vec::new());
+        Ok((object, StageReports { coordinates, bvh, collapse, ..StageReports::default() }))
     }
 
     /// Compiles a mesh whose vertices move, with the options of deformable objects

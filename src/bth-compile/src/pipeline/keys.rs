@@ -8,6 +8,7 @@ use super::import::Import;
 use super::marks::Mark;
 use super::moving::BuildPoses;
 use super::object::Collapse;
+use super::parts::BuildInParts;
 use super::place::PlaceOnGrid;
 use super::tetrahedralize::Tetrahedralize;
 use super::tree::BuildTree;
@@ -122,6 +123,7 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         ("mesh version", Import::VERSION.to_owned()),
         ("coordinates version", PlaceOnGrid::VERSION.to_owned()),
         ("bvh version", BuildTree::VERSION.to_owned()),
+        ("parts version", BuildInParts::VERSION.to_owned()),
         ("poses version", BuildPoses::VERSION.to_owned()),
         ("free directions version", FindFree::VERSION.to_owned()),
         ("collapse version", Collapse::VERSION.to_owned()),

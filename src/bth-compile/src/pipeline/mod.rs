@@ -3,6 +3,7 @@
 //!
 //! `compiler` calls the stages in order; each is a `Stage` (`stage.rs`) in a separate file.
 //! `compile` is the way in, for a model in a file or in memory, with or without a cache.
+//! Very large meshes go from their coordinates to the wide tree in `parts`.
 //! `direct` is the short way in, for a mesh in memory and a fast BVH.
 
 mod choose_nodes;
@@ -16,6 +17,7 @@ mod keys;
 mod marks;
 mod moving;
 mod object;
+mod parts;
 mod place;
 mod provenance;
 mod report;

@@ -24,10 +24,34 @@ impl From<bth_format::File> for Compiled {
     }
 }
 
+/// The tree of an object.
+pub(super) struct Hierarchy {
+    pub(super) wide: bvh::Wide,
+    /// The box of what can be hit; `None` if that is nothing.
+    pub(super) bounds: Option<([f32; 3], [f32; 3])>,
+    /// Triangles that no ray can hit.
+    pub(super) dropped: u32,
+}
+
+/// What an object keeps besides its tree.
+pub(super) struct ObjectSource {
+    /// The mesh; its vertices are on the grid, if there is one.
+    pub(super) mesh: Mesh,
+    /// The grid and the original positions, if vertices were moved.
+    pub(super) on_grid: Option<OnGrid>,
+    /// Absent where free directions are not kept.
+    pub(super) free: Option<free::Free>,
+    /// How it was compiled, if its vertices move by themselves.
+    pub(super) motion: Option<MotionReport>,
+}
+
 /// An object that is ready to be written.
 pub(crate) struct Object {
-    traced: TracedMesh,
-    wide: bvh::Wide,
+    /// The mesh; its vertices are on the grid, if there is one.
+    mesh: Mesh,
+    /// The grid and the original positions, if vertices were moved.
+    on_grid: Option<OnGrid>,
+    hierarchy: Hierarchy,
     /// The place of each triangle in the leaves.
     places: Vec<u32>,
     /// Absent where free directions are not kept.
@@ -61,26 +85,37 @@ impl Stage for Collapse<'_> {
         let Self { traced, leaves, free, motion, options } = self;
         let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = leaves.into_iter().unzip();
         let (wide, report) = collapse(traced.by_ref(), &cut, options, monitor)?;
-        let triangles = traced.mesh.triangles.len();
-        let encoded = (!meshes.is_empty()).then(|| tets::encode(&meshes, triangles));
-        let grid = traced.on_grid.as_ref().map(|on_grid| &on_grid.grid);
-        let places = bvh::triangle_places(&wide, grid, triangles);
-        let object = Object {
-            free: free.map(|free| free::FreeRows::new(free, &places)),
-            groups: traced.mesh.groups.as_ref().map(write::GroupParts::of),
-            tet_leaves: meshes.len() as u64,
-            tet_triangles: meshes.iter().map(|m| m.faces.len() as u64).sum(),
-            traced,
-            wide,
-            places,
-            encoded,
-            motion,
-        };
-        Ok((object, report))
+        // The tree takes more memory than the rest, and is not needed any more.
+        let TracedMesh { mesh, on_grid, tree, .. } = traced;
+        let bounds = tree.nodes.first().map(|root| (root.lower, root.upper));
+        let dropped = (mesh.triangles.len() - tree.order.len()) as u32;
+        drop(tree);
+        let source = ObjectSource { mesh, on_grid, free, motion };
+        Ok((Object::new(source, Hierarchy { wide, bounds, dropped }, meshes), report))
     }
 }
 
 impl Object {
+    /// An object with a tree, in which tet leaves are these.
+    pub(super) fn new(source: ObjectSource, hierarchy: Hierarchy, tets: Vec<tets::TetMesh>) -> Self {
+        let ObjectSource { mesh, on_grid, free, motion } = source;
+        let triangles = mesh.triangles.len();
+        let grid = on_grid.as_ref().map(|on_grid| &on_grid.grid);
+        let places = bvh::triangle_places(&hierarchy.wide, grid, triangles);
+        Self {
+            free: free.map(|free| free::FreeRows::new(free, &places)),
+            groups: mesh.groups.as_ref().map(write::GroupParts::of),
+            tet_leaves: tets.len() as u64,
+            tet_triangles: tets.iter().map(|tets| tets.faces.len() as u64).sum(),
+            encoded: (!tets.is_empty()).then(|| tets::encode(&tets, triangles)),
+            mesh,
+            on_grid,
+            hierarchy,
+            places,
+            motion,
+        }
+    }
+
     /// The file with this object only, after the checks of a reader.
     pub(super) fn file(
         &self,
@@ -95,7 +130,7 @@ impl Object {
         let file = write::open(&builder)?;
         file.check_images().map_err(write::defect)?;
         let resident_bytes = file.resident_bytes();
-        let triangles = self.traced.mesh.triangles.len();
+        let triangles = self.mesh.triangles.len();
         let report = FileReport {
             bytes: file.bytes().len() as u64,
             tet_leaves: self.tet_leaves,
@@ -108,24 +143,24 @@ impl Object {
 
     /// Names of the images that its textures refer to.
     pub(super) fn image_names(&self) -> BTreeSet<[u8; 16]> {
-        let materials = self.traced.mesh.materials.iter();
+        let materials = self.mesh.materials.iter();
         materials.flat_map(|m| &m.textures).map(|texture| texture.image).collect()
     }
 
     /// The contents of the object's sections.
     pub(crate) fn parts(&self, options: &CompileOptions) -> write::ObjectParts<'_> {
-        let TracedMesh { mesh, on_grid, tree, .. } = &self.traced;
+        let Self { mesh, on_grid, hierarchy: Hierarchy { wide, bounds, dropped }, .. } = self;
         let mut parts = write::ObjectParts {
-            bounds: tree.nodes.first().map(|root| (root.lower, root.upper)),
-            root: self.wide.root,
+            bounds: *bounds,
+            root: wide.root,
             triangles: mesh.triangles.len() as u32,
-            dropped: (mesh.triangles.len() - tree.order.len()) as u32,
-            lines: &self.wide.lines,
-            triangle_ids: &self.wide.triangle_ids,
-            leaf_vertices: &self.wide.leaf_vertices,
+            dropped: *dropped,
+            lines: &wide.lines,
+            triangle_ids: &wide.triangle_ids,
+            leaf_vertices: &wide.leaf_vertices,
             places: &self.places,
             grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
-            widened_boxes: self.wide.widened_boxes,
+            widened_boxes: wide.widened_boxes,
             groups: self.groups.as_ref(),
             materials: mesh.materials.as_ref(),
             deformation: mesh.deformation.as_ref(),
@@ -137,7 +172,7 @@ impl Object {
             parts.free_distances = &free.distances;
             parts.free_levels = &free.levels;
         }
-        if let Some(sequence) = mesh.sequence.as_ref().filter(|_| !self.wide.leaf_vertices.is_empty()) {
+        if let Some(sequence) = mesh.sequence.as_ref().filter(|_| !wide.leaf_vertices.is_empty()) {
             parts.sequence_times = &sequence.times;
             parts.sequence_positions = &sequence.positions;
         }

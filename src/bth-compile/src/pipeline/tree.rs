@@ -73,7 +73,16 @@ impl CachedStage<BinaryBvh, BvhReport> for BuildTree<'_> {
 }
 
 fn build(mesh: &Mesh, options: &TreeOptions<'_>, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
-    let (tree, mut report) = bvh::build(mesh, &options.bvh, monitor)?;
+    rebuilt(mesh, bvh::build(mesh, &options.bvh, monitor)?, options, monitor)
+}
+
+/// A tree after its treelets were rebuilt.
+pub(super) fn rebuilt(
+    mesh: &Mesh,
+    (tree, mut report): (BinaryBvh, BvhReport),
+    options: &TreeOptions<'_>,
+    monitor: &dyn Monitor,
+) -> Result<(BinaryBvh, BvhReport)> {
     let visits = |tree: &BinaryBvh| sampling::visits(mesh, tree, options.rays);
     let tree = bvh::rebuild_treelets(mesh, tree, options.rounds(), &visits, &mut report, monitor)?;
     Ok((tree, report))

@@ -63,7 +63,7 @@ fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
         return Err(source.error_at_byte(TRUNCATED, data.len(), message, TRUNCATED_HINT));
     }
     check_triangles(u64::from(count))?;
-    check_memory(u64::from(count), BYTES_PER_TRIANGLE)?;
+    check_memory(u64::from(count), BYTES_PER_TRIANGLE, true)?;
     let extra = body.len() - count as usize * FACET;
     if extra > 0 {
         source.monitor.warn(&format!("{extra} bytes after the last facet are ignored"));

@@ -24,8 +24,9 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Parts of at most `most` triangles. Each is split at a median of its centres along the axis
-    /// in which these extend farthest.
+    /// Parts of at most `most` triangles, as many as a wide tree has nodes at a level (16, 256 and so
+    /// on), so that joining them adds no level. What is split is split at a median of its centres
+    /// along the axis in which these extend farthest.
     ///
     /// # Errors
     /// The errors of [`build`](super::build()).
@@ -40,15 +41,18 @@ impl Parts {
         let whole = Node { lower, upper, first: 0, count: used.len() as u32, right: 0 };
         let mut parts = Self { ids: Vec::new(), whole: (!used.is_empty()).then_some(whole) };
         if parts.whole.is_some() {
-            parts.split(mesh, used, most, monitor)?;
+            let enough = |count: &usize| count.saturating_mul(most) >= used.len();
+            let counts = std::iter::successors(Some(1), |count: &usize| Some(count.saturating_mul(WIDTH)));
+            let count = counts.skip_while(|count| !enough(count)).next().unwrap_or(1);
+            parts.split(mesh, used, count, monitor)?;
         }
         Ok(parts)
     }
 
-    fn split(&mut self, mesh: &Mesh, mut ids: Vec<u32>, most: usize, monitor: &dyn Monitor) -> Result<()> {
+    /// Adds `count` parts, a power of two.
+    fn split(&mut self, mesh: &Mesh, mut ids: Vec<u32>, count: usize, monitor: &dyn Monitor) -> Result<()> {
         monitor.check()?;
-        let count = ids.len().div_ceil(most);
-        if count <= 1 {
+        if count == 1 || ids.len() == 1 {
             ids.sort_unstable();
             self.ids.push(ids);
             return Ok(());
@@ -59,13 +63,13 @@ impl Parts {
         let extent = |k: usize| all.upper[k] - all.lower[k];
         let axis = (1..3).fold(0, |most, k| if extent(k) > extent(most) { k } else { most });
         let mut keyed: Vec<(f32, u32)> = ids.par_iter().map(|&id| (center(id)[axis], id)).collect();
-        let middle = ids.len() * (count / 2) / count;
+        let middle = ids.len() / 2;
         keyed.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         ids.par_iter_mut().zip(keyed).for_each(|(id, key)| *id = key.1);
         let right = ids.split_off(middle);
         ids.shrink_to_fit();
-        self.split(mesh, ids, most, monitor)?;
-        self.split(mesh, right, most, monitor)
+        self.split(mesh, ids, count / 2, monitor)?;
+        self.split(mesh, right, count / 2, monitor)
     }
 }
 

@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 /// Bytes of memory that a triangle takes until it is compiled, from the reading of its
 /// model on (measured: 162 with `--quality fast`, 219 by default).
 pub const BYTES_PER_TRIANGLE: u64 = 165;
-/// Objects of more triangles are built in parts of so many. A constant, since bytes of files do not
-/// depend on the memory.
+/// Objects of more triangles are built in parts of at most so many. A constant, since bytes of files
+/// do not depend on the memory.
 pub const TRIANGLES_AT_ONCE: u64 = 1 << 24;
 /// Bytes of memory that each triangle beyond these takes.
 const BYTES_IN_PARTS: u64 = 110;

@@ -12,7 +12,7 @@ use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
 use bth_compile::cached::Cache;
 use bth_compile::memory::{self, Instance, PositionRows, TriangleMesh};
-use bth_compile::pipeline::{CompileOptions, Structure, compile};
+use bth_compile::pipeline::{CompileOptions, compile};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

@@ -42,8 +42,8 @@ impl Parts {
         let mut parts = Self { ids: Vec::new(), whole: (!used.is_empty()).then_some(whole) };
         if parts.whole.is_some() {
             let enough = |count: &usize| count.saturating_mul(most) >= used.len();
-            let counts = std::iter::successors(Some(1), |count: &usize| Some(count.saturating_mul(WIDTH)));
-            let count = counts.skip_while(|count| !enough(count)).next().unwrap_or(1);
+            let mut counts = std::iter::successors(Some(1usize), |count| Some(count.saturating_mul(WIDTH)));
+            let count = counts.find(enough).unwrap_or(1);
             parts.split(mesh, used, count, monitor)?;
         }
         Ok(parts)

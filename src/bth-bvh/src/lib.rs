@@ -4,8 +4,8 @@
 //! lower cost. [`rebuild_treelets()`] rebuilds small parts of the tree where the wide tree then
 //! costs less. [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
 //!
-//! [`Parts`] splits a mesh that is too large to be built at once; [`join()`] joins the wide trees of
-//! its parts.
+//! [`Parts`] splits a mesh that is too large to be built at once. [`join()`] joins the wide trees
+//! of its parts.
 //!
 //! [`build_poses()`] builds one tree for several poses of a mesh that deforms, with the cost summed
 //! over them.

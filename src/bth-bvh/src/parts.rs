@@ -19,14 +19,14 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub struct Parts {
     /// Ids of the triangles of each part, ascending.
     pub ids: Vec<Vec<u32>>,
-    /// A node over all triangles; `None` if there are none.
+    /// A node over all triangles; `None` if there is no triangle.
     pub whole: Option<Node>,
 }
 
 impl Parts {
-    /// Parts of at most `most` triangles, as many as a wide tree has nodes at a level (16, 256 and so
-    /// on), so that joining them adds no level. What is split is split at a median of its centres
-    /// along the axis in which these extend farthest.
+    /// Parts of at most `most` triangles. Their number is a power of 16, which is the number of nodes
+    /// at a level of a wide tree: so joining them adds no level. Each split is at a median of the
+    /// centres, along the axis in which these extend farthest.
     ///
     /// # Errors
     /// The errors of [`build`](super::build()).
@@ -75,7 +75,7 @@ impl Parts {
 
 /// The wide tree of a part.
 pub struct Part {
-    /// The tree. Its boxes are widened if those of all parts are
+    /// The tree. Its boxes are widened in all parts, or in none
     /// ([`CollapseOptions::whole`](super::CollapseOptions)).
     pub wide: Wide,
     /// The root of its binary tree.
@@ -179,7 +179,7 @@ impl UpperNode {
 }
 
 /// The children of a wide node: the node is opened, then the child of the largest area, until there
-/// are as many as fit. The one comes last in which a ray most probably hits something, as in
+/// are 16. The one comes last in which a ray most probably hits something, as in
 /// [`slot_order`](super::slot_order).
 fn children(upper: &BinaryBvh, triangles: &[usize], at: u32) -> Vec<u32> {
     let node = |at: u32| &upper.nodes[at as usize];
@@ -200,7 +200,7 @@ fn children(upper: &BinaryBvh, triangles: &[usize], at: u32) -> Vec<u32> {
     children
 }
 
-/// A child code whose line is so many lines behind.
+/// A child code whose block is moved back by a number of lines.
 fn moved(code: u32, lines: usize) -> u32 {
     let lines = lines as u32;
     match Child::from_code(code) {
@@ -211,7 +211,8 @@ fn moved(code: u32, lines: usize) -> u32 {
     }
 }
 
-/// Moves the children of all nodes by so many lines, and the ids of all leaves by so many rows.
+/// Moves the children of all nodes back by a number of lines, and the ids of all leaves by a number
+/// of rows.
 fn move_blocks(wide: &mut Wide, lines: usize, rows: usize) {
     let mut stack = vec![wide.root];
     while let Some(code) = stack.pop() {

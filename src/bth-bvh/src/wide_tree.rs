@@ -112,8 +112,8 @@ impl Writer<'_> {
         Ok(slots[0].code)
     }
 
-    /// Determines the shape of the tree: its slots, the first of which holds the root while every
-    /// other belongs to a node, and its blocks in depth-first order.
+    /// Determines the shape of the tree: its slots, and its blocks in depth-first order. The first
+    /// slot holds the root, and every other belongs to a node.
     fn shape(&mut self) -> (Vec<Slot>, Vec<Block>) {
         let mut slots = vec![Slot { node: 0, code: NONE }];
         let mut blocks = Vec::new();

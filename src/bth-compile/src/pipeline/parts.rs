@@ -85,7 +85,7 @@ mod tests {
         Object::new(source, hierarchy, Vec::new()).file(String::new(), &[], options).unwrap().0
     }
 
-    /// Answers are those of the file that is built at once, and every byte is verified.
+    /// Answers equal the answers of the file that is built at once, and every byte is verified.
     #[test]
     fn files_of_parts_are_whole_and_answer_alike() {
         let mut random = bth_random::Rng::new(11);

@@ -41,7 +41,7 @@ impl<'a> ShadingGeometry<'a> {
     }
 
     /// Fails when the file tells neither the places of triangles in leaves nor their positions in
-    /// the source, of which normals need one.
+    /// the source. Normals need one of both.
     pub(crate) fn require_triangles(&self, file: &Path) -> Result<(), Failure> {
         if self.objects.iter().all(ObjectView::has_corners) {
             return Ok(());

@@ -70,8 +70,7 @@ impl<'a> Shader<'a> {
     }
 }
 
-/// Of so many camera rays of a square one is traced before the others, to read what lies around its
-/// hit.
+/// One of 64 camera rays of a square is traced before the others, to read what lies around its hit.
 const SPARSE: usize = 64;
 
 /// Reads ahead for camera rays that are close to each other, where the file does not fit in memory.

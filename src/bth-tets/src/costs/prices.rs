@@ -41,8 +41,8 @@ impl<'a> Prices<'a> {
         self.scale * walk.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
     }
 
-    /// Nanoseconds of a ray that starts on a triangle of the node. The share `hits` of such rays ends
-    /// at a triangle.
+    /// Nanoseconds of a ray that starts on a triangle of the node. The share `hits` of such rays
+    /// ends at a triangle.
     pub(super) fn surface(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.options.profile.tets.surface, triangles, steps, hits)
     }

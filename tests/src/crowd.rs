@@ -70,7 +70,7 @@ pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
     let parts_of_scene = SceneParts {
         scene: Scene { rate: 24.0, first_frame: 0, last_frame: 2400, camera: NONE, reserved: [0; 11] },
         nodes,
-        instances: (1..=count).map(|node| Instance { node, object: 0, flags: 0, reserved: 0 }).collect(),
+        instances: (0..count).map(|first| Instance { node: first + 1, object: 0, flags: 0, first }).collect(),
         tracks,
         times,
         values,

@@ -146,7 +146,7 @@ fn scene_of(matrices: &[[f64; 12]]) -> SceneParts {
         name_length: 0,
         reserved: [0; 4],
     };
-    let instance = |node: u32| Instance { node, object: 0, flags: 0, reserved: 0 };
+    let instance = |node: u32| Instance { node, object: 0, flags: 0, first: node };
     SceneParts {
         scene: Scene { rate: 24.0, first_frame: 0, last_frame: 0, camera: NONE, reserved: [0; 11] },
         nodes: matrices.iter().map(node).collect(),

@@ -94,7 +94,9 @@ fn byte_tables_are_those_of_the_structures() {
         Link { next opposite }
         Scene { rate first_frame last_frame camera reserved }
         Node { transform parent flags name name_length reserved }
-        Instance { node object flags reserved }
+        Instance { node object flags first }
+        Tree { magnitude condition first_line lines depth first_row rows visible instances extent origin_slack end_node
+            reserved }
         Track { node property interpolation keys first_time first_value reserved }
         Camera { node projection name name_length size aspect near far reserved }
         Light { node kind name name_length color intensity range inner outer reserved }

@@ -22,9 +22,9 @@ PROVENANCE, OBJECT_NAMES, OBJECT_LABELS = range(32, 35)
 MATERIAL_PARAMETERS, TEXTURES, COLOR_CORNERS, COLORS, IMAGES, IMAGE_BYTES = range(35, 41)
 DEFORMATION, JOINTS, JOINT_WEIGHTS, MORPHS, MORPH_ROWS, MORPH_DELTAS = range(41, 47)
 SCENE, NODES, INSTANCES, TRACKS, TIMES, VALUES, CAMERAS, LIGHTS, NAMES = range(48, 57)
-DEFORMERS, SKINS, SKIN_JOINTS, MORPH_WEIGHTS = range(57, 61)
+DEFORMERS, SKINS, SKIN_JOINTS, MORPH_WEIGHTS, TREES, TREE_LINES = range(57, 63)
 SECOND_CORNERS, SECOND_UVS, GLOSS_PARAMETERS = 68, 69, 70
-OF_FILE = {PROVENANCE, OBJECT_NAMES, OBJECT_LABELS, IMAGES, IMAGE_BYTES, *range(SCENE, MORPH_WEIGHTS + 1)}
+OF_FILE = {PROVENANCE, OBJECT_NAMES, OBJECT_LABELS, IMAGES, IMAGE_BYTES, *range(SCENE, TREE_LINES + 1)}
 
 # Kind: name, strides, most elements.
 KINDS = {
@@ -88,6 +88,8 @@ KINDS = {
     SKINS: ("SKINS", (16,), (1 << 32) - 2),
     SKIN_JOINTS: ("SKIN_JOINTS", (112,), (1 << 32) - 2),
     MORPH_WEIGHTS: ("MORPH_WEIGHTS", (8,), (1 << 32) - 2),
+    TREES: ("TREES", (64,), (1 << 31) - 1),
+    TREE_LINES: ("TREE_LINES", (64,), (1 << 31) - 1),
 }
 
 Header = namedtuple(
@@ -137,7 +139,7 @@ class Container:
         known = FEATURE_GRID | FEATURE_WIDENED_BOXES
         need(h.required_features & ~known == 0, "F007", f"unknown features {h.required_features:#x}", 48)
         end = HEADER.size + ENTRY.size * h.section_count
-        fits = h.section_offset == HEADER.size and h.section_count <= 1 << 20 and end <= len(data)
+        fits = h.section_offset == HEADER.size and h.section_count <= 1 << 22 and end <= len(data)
         need(fits, "F008", f"{h.section_count} sections at {h.section_offset}", 32)
         need(h.table_hash == hash128(data[HEADER.size : end]), "F009", "the section table was changed", 96)
         self.data = data
@@ -151,6 +153,7 @@ class Container:
     def _check_entries(self, end):
         """F006, F010 to F016 and F022; returns where the last section ends. `end` is where the table does."""
         before = None
+        ends = {True: end, False: max([end, *(e.offset + e.length for e in self.entries if e.kind == OBJECT)])}
         for i, e in enumerate(self.entries):
             at, name = HEADER.size + ENTRY.size * i, kind_name(e.kind)
             key = (e.object, e.kind)
@@ -159,9 +162,9 @@ class Container:
             need(e.reserved == 0, "F006", "a reserved field is not zero", at, name)
             need(e.flags in (0, 1), "F016", f"flags {e.flags}", at, name)
             need(e.alignment == 64 and e.offset % 64 == 0, "F011", f"offset {e.offset}", at, name)
-            inside = end <= e.offset and e.offset + e.length <= len(self.data)
+            inside = ends[e.kind == OBJECT] <= e.offset and e.offset + e.length <= len(self.data)
             need(inside, "F012", f"{e.length} bytes at {e.offset}", at, name)
-            end = e.offset + e.length
+            ends[e.kind == OBJECT] = e.offset + e.length
             need(e.stride * e.count == e.length, "F013", f"{e.count} x {e.stride} is not {e.length}", at, name)
             need(e.kind != FORMER_SEGMENTS, "F007", "trees for ranges of time of older files", at, name)
             if e.kind in KINDS:
@@ -172,7 +175,7 @@ class Container:
                 need(most is None or e.count <= most, "F022", f"{e.count} elements", at, name)
             else:
                 need(e.flags == 0, "F015", f"unknown kind {e.kind}", at, name)
-        return end
+        return ends[False]
 
     def _check_objects(self):
         """F017."""
@@ -198,7 +201,7 @@ class Container:
     def check_bytes(self):
         """Gaps and hashes: F020 and F021."""
         end = HEADER.size + ENTRY.size * len(self.entries)
-        for e in [*self.entries, None]:
+        for e in [*sorted(self.entries, key=lambda e: e.kind != OBJECT), None]:
             start = len(self.data) if e is None else e.offset
             need(not any(self.data[end:start]), "F020", f"bytes {end} to {start} are not zero", end)
             if e is not None:

@@ -20,6 +20,7 @@ from bth_materials import MaterialsView, check_images  # noqa: E402
 from bth_object import ObjectView  # noqa: E402
 from bth_scene import SceneView, check_scene  # noqa: E402
 from bth_sequences import SequenceView  # noqa: E402
+from bth_trees import check_trees  # noqa: E402
 
 
 def describe(container):
@@ -103,7 +104,10 @@ def check(data, level):
                 check_geometry(view, tets)
         object_names(container)
         check_images(container, materials)
-        check_scene(SceneView(container))
+        scene = SceneView(container)
+        check_scene(scene)
+        if level == "verify":
+            check_trees(scene)
     return container
 
 

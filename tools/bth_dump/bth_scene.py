@@ -12,7 +12,7 @@ from bth_groups import checked
 
 Scene = namedtuple("Scene", "rate first_frame last_frame camera reserved")
 Node = namedtuple("Node", "transform parent flags name name_length reserved")
-Instance = namedtuple("Instance", "node object flags reserved")
+Instance = namedtuple("Instance", "node object flags first")
 Track = namedtuple("Track", "node property interpolation keys first_time first_value reserved")
 Camera = namedtuple("Camera", "node projection name name_length size aspect near far reserved")
 Light = namedtuple("Light", "node kind name name_length color intensity range inner outer reserved")
@@ -89,7 +89,7 @@ def check_scene(view):
             there = x.object < len(view.nodes) and view.nodes[x.object].flags & GROUP
         else:
             there = x.object < view.container.objects
-        good = x.node < len(view.nodes) and there and x.flags < 2 and x.reserved == 0
+        good = x.node < len(view.nodes) and there and x.flags < 2
         need(good, "F154", f"{x}", c.INSTANCES)
     view.deformers.check()
     check_tracks(view)
@@ -108,29 +108,36 @@ def check_scene(view):
     check_groups(view)
 
 
-def check_groups(view):
-    """F188."""
-    need = view.need
+def groups_of(view):
+    """The number of groups of nodes, which is the world's, and for each node the number of its group."""
     world = sum(n.flags & GROUP != 0 for n in view.nodes)
-    if not world:
-        return
     group_of, last = [], -1
     for n in view.nodes:
         last += n.flags & GROUP != 0
         own = last if n.flags & GROUP else world
         group_of.append(own if n.parent == NONE else group_of[n.parent])
+    return world, group_of
+
+
+def check_groups(view):
+    """F188, and F154 of the numbers of instances."""
+    need = view.need
+    world, group_of = groups_of(view)
     skinned = {d.object for d in view.deformers.deformers if d.skin != NONE}
+    numbered = True
     before, count, levels = 0, [0] * (world + 1), [0] * (world + 1)
     for x in view.instances:
         within = group_of[x.node]
         inner = group_of[x.object] if x.flags & OF_GROUP else None
         good = before <= within and (inner is None or inner < within)
-        good = good and (within == world or inner is not None or x.object not in skinned)
+        good = good and (within == world or inner is not None or x.object not in skinned or not world)
         need(good, "F188", f"{x}", c.INSTANCES)
+        numbered = numbered and x.first == count[within]
         before = within
         count[within] += 1 if inner is None else count[inner]
         levels[within] = max(levels[within], 1 + (0 if inner is None else levels[inner]))
         need(count[within] < NONE and levels[within] <= MAX_PATH, "F188", f"{x}", c.INSTANCES)
+    need(numbered, "F154", "numbers of first instances", c.INSTANCES)
     for rows, kind in ((view.cameras, c.CAMERAS), (view.lights, c.LIGHTS), (view.deformers.deformers, c.DEFORMERS)):
         for x in rows:
             need(group_of[x.node] == world, "F188", f"{x}", kind)

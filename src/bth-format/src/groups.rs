@@ -55,18 +55,24 @@ impl Groups {
     }
 
     /// What each group and then the world holds, if each group only has instances of groups with a
-    /// lower number.
+    /// lower number. Calls `first` with each row of `instances` and the number of its first
+    /// instance among those of its group.
     ///
     /// # Errors
     /// What is found if that exceeds the limits.
-    pub fn written_out(&self, view: &SceneView<'_>) -> Result<Vec<WrittenOut>, String> {
+    pub fn written_out(
+        &self,
+        instances: &[Instance],
+        mut first: impl FnMut(usize, u32),
+    ) -> Result<Vec<WrittenOut>, String> {
         let mut groups = vec![WrittenOut::default(); self.world as usize + 1];
-        for instance in view.instances {
+        for (row, instance) in instances.iter().enumerate() {
             let shown = match instance.group() {
                 Some(node) => groups[self.of_node(node) as usize],
                 None => WrittenOut { instances: 1, levels: 0 },
             };
             let group = &mut groups[self.of_node(instance.node) as usize];
+            first(row, group.instances);
             group.levels = group.levels.max(shown.levels + 1);
             if group.levels > MAX_PATH {
                 return Err(format!("{} levels", group.levels));
@@ -74,6 +80,17 @@ impl Groups {
             let sum = group.instances.checked_add(shown.instances).filter(|sum| *sum < NONE);
             group.instances = sum.ok_or("more")?;
         }
+        Ok(groups)
+    }
+
+    /// Gives each row the number of its first instance; returns what [`Self::written_out`] does.
+    ///
+    /// # Errors
+    /// As [`Self::written_out`].
+    pub fn number(&self, instances: &mut [Instance]) -> Result<Vec<WrittenOut>, String> {
+        let mut numbers = Vec::with_capacity(instances.len());
+        let groups = self.written_out(instances, |_, first| numbers.push(first))?;
+        instances.iter_mut().zip(numbers).for_each(|(instance, first)| instance.first = first);
         Ok(groups)
     }
 }

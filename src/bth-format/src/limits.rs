@@ -4,7 +4,7 @@
 /// all children but the one entered stay.
 pub const MAX_DEPTH: usize = 96;
 /// Entries of the section table (BTH-F008).
-pub const MAX_SECTIONS: u32 = 1 << 20;
+pub const MAX_SECTIONS: u32 = 1 << 22;
 /// Triangles of an object (BTH-F022).
 pub const MAX_TRIANGLES: u32 = 1 << 30;
 /// Tetrahedra of an object (BTH-F022).
@@ -16,6 +16,8 @@ pub const MAX_LEAF_VERTICES: u32 = 1 << 28;
 /// Bytes of the name of a group or material (BTH-F144), of an object (BTH-F148), or of a node,
 /// camera or light (BTH-F153).
 pub const MAX_NAME: u32 = 4096;
+/// Nodes on a path of a hierarchy whose groups have stored trees (BTH-F212).
+pub const MAX_STORED_LEVELS: u32 = 64;
 /// Instances on the way to an instance of an object through groups of nodes, that one included
 /// (BTH-F188).
 pub const MAX_PATH: u32 = 16;

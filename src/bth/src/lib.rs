@@ -59,7 +59,7 @@ pub use bth_format::layout::Opacity;
 pub use bth_format::{Code, Error};
 pub use builder::{Content, SceneBuilder};
 pub use hits::{Accept, Crossings, Cull, Filter};
-pub use instances::InstancePath;
+pub use instances::{InstancePath, Trees};
 pub use materials::{Alpha, Gloss, Material, Texture, Wrap};
 pub use points::{Closest, Closest64, Feature};
 pub use query::Steps;

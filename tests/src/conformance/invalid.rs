@@ -20,6 +20,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(groups());
     cases.extend(super::materials::invalid());
     cases.extend(super::scenes::invalid());
+    cases.extend(super::trees::invalid());
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     cases
 }

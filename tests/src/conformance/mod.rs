@@ -10,6 +10,7 @@ mod exact;
 mod invalid;
 mod materials;
 mod scenes;
+mod trees;
 mod valid;
 pub mod worst;
 

@@ -27,7 +27,7 @@ pub(super) fn still() -> SceneParts {
     SceneParts {
         scene: Scene { rate: 24.0, first_frame: 0, last_frame: 0, camera: NONE, reserved: [0; 11] },
         nodes: vec![node(identity, NONE, 0, (0, 0))],
-        instances: vec![Instance { node: 0, object: 0, flags: 0, reserved: 0 }],
+        instances: vec![Instance { node: 0, object: 0, flags: 0, first: 0 }],
         tracks: Vec::new(),
         times: Vec::new(),
         values: Vec::new(),
@@ -48,8 +48,8 @@ fn moving() -> SceneParts {
             node(parts([1.0, 2.0, 3.0], TURN, [1.0, 1.0, -0.5]), 0, 0, (4, 5)),
             node(parts([0.0, 0.0, 9.0], TURN, [1.0; 3]), NONE, NODE_HIDDEN, (9, 3)),
         ],
-        instances: [(1, 1), (0, 0), (1, 0)]
-            .map(|(node, object)| Instance { node, object, flags: 0, reserved: 0 })
+        instances: [(1, 1, 0), (0, 0, 1), (1, 0, 2)]
+            .map(|(node, object, first)| Instance { node, object, flags: 0, first })
             .to_vec(),
         ..still()
     };
@@ -103,15 +103,15 @@ fn moving() -> SceneParts {
     parts
 }
 
-fn of_group(node: u32, group: u32) -> Instance {
-    Instance { node, object: group, flags: INSTANCE_OF_GROUP, reserved: 0 }
+fn of_group(node: u32, group: u32, first: u32) -> Instance {
+    Instance { node, object: group, flags: INSTANCE_OF_GROUP, first }
 }
 
 /// Two instances in a group, that group and an object in another, and both groups in the world.
 /// Written out they are nine instances.
-fn groups() -> SceneParts {
+pub(super) fn groups() -> SceneParts {
     let at = |x: f64, rotation: [f64; 4], scale: f64| parts([x, 0.0, 0.0], rotation, [scale, 1.0, scale]);
-    let of_object = |node, object| Instance { node, object, flags: 0, reserved: 0 };
+    let of_object = |node, object, first| Instance { node, object, flags: 0, first };
     let moved = moving();
     let mut track = moved.tracks[1];
     (track.first_time, track.first_value) = (0, 0);
@@ -125,14 +125,14 @@ fn groups() -> SceneParts {
             node(at(-5.0, TURN, 0.25), 3, 0, (0, 0)),
         ],
         instances: vec![
-            of_object(0, 0),
-            of_object(1, 1),
-            of_group(2, 0),
-            of_object(2, 1),
-            of_group(3, 2),
-            of_group(4, 0),
-            of_object(4, 0),
-            of_group(4, 2),
+            of_object(0, 0, 0),
+            of_object(1, 1, 1),
+            of_group(2, 0, 0),
+            of_object(2, 1, 2),
+            of_group(3, 2, 0),
+            of_group(4, 0, 3),
+            of_object(4, 0, 5),
+            of_group(4, 2, 6),
         ],
         tracks: vec![track],
         times: moved.times[2..4].to_vec(),
@@ -154,20 +154,20 @@ fn no_groups() -> Vec<Case> {
     vec![
         case("F188-order", |parts| parts.instances.swap(0, 3)),
         case("F188-itself", |parts| parts.instances[2].object = 2),
-        case("F188-later-group", |parts| parts.instances[1] = of_group(1, 2)),
+        case("F188-later-group", |parts| parts.instances[1] = of_group(1, 2, 1)),
         case("F188-camera", |parts| parts.cameras[0].node = 1),
         case("F188-light", |parts| parts.lights[0].node = 2),
         case("F188-levels", |parts| {
             parts.nodes = vec![parts.nodes[2]; 16];
             parts.nodes.push(Node { flags: 0, ..parts.nodes[0] });
-            let shown = (1..17).map(|node| of_group(node, node - 1));
+            let shown = (1..17).map(|node| of_group(node, node - 1, 0));
             parts.instances = std::iter::once(parts.instances[0]).chain(shown).collect();
             (parts.tracks, parts.times, parts.values) = (Vec::new(), Vec::new(), Vec::new());
             (parts.cameras, parts.lights) = (Vec::new(), Vec::new());
         }),
         case("F188-too-many", |parts| {
             parts.nodes = vec![parts.nodes[2]; 12];
-            let four = |node: u32| (0..8).map(move |_| of_group(node, node - 1));
+            let four = |node: u32| (0..8).map(move |_| of_group(node, node - 1, 0));
             parts.instances = std::iter::once(parts.instances[0]).chain((1..12).flat_map(four)).collect();
             (parts.tracks, parts.times, parts.values) = (Vec::new(), Vec::new(), Vec::new());
             (parts.cameras, parts.lights) = (Vec::new(), Vec::new());
@@ -177,12 +177,18 @@ fn no_groups() -> Vec<Case> {
 
 /// A file with a number of equal objects and a scene.
 fn file(objects: u32, scene_parts: &SceneParts) -> Vec<u8> {
+    builder_of(objects, scene_parts).finish()
+}
+
+/// The same, to which sections can be added.
+pub(super) fn builder_of(objects: u32, scene_parts: &SceneParts) -> FileBuilder<'_> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
     let parts = one_triangle(&lines);
     let mut builder = FileBuilder::new();
     (0..objects).for_each(|i| object(&mut builder, i, &parts).expect("the parts fit together"));
+    let mut builder = builder.into_static();
     scene(&mut builder, scene_parts).expect("each section once");
-    builder.finish()
+    builder
 }
 
 /// The valid files.
@@ -271,7 +277,7 @@ fn nodes() -> Vec<Case> {
         word("F154-object", kind::INSTANCES, 4, 2),
         word("F154-flags", kind::INSTANCES, 8, 2),
         word("F154-no-group", kind::INSTANCES, 8, INSTANCE_OF_GROUP),
-        word("F154-reserved", kind::INSTANCES, 12, 1),
+        word("F154-number", kind::INSTANCES, 12, 1),
     ]
 }
 

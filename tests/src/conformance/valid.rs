@@ -37,6 +37,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());
+    cases.extend(super::trees::valid());
     cases.push(Case::new("tets-link32", tets_of(false, &[])));
     cases
 }

@@ -15,3 +15,4 @@ mod rigid_parts;
 mod sequences;
 mod sources;
 mod support;
+mod trees;

@@ -113,6 +113,7 @@ fn view(parts: &SceneParts) -> SceneView<'_> {
         skins: &parts.deformers.skins,
         skin_joints: &parts.deformers.joints,
         morph_weights: &parts.deformers.weights,
+        ..SceneView::default()
     }
 }
 

@@ -13,11 +13,18 @@ use crate::options::CompileOptions;
 use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetch};
 use crate::stage::Clock;
 use crate::write::{self, Content, FileBuilder, SceneParts};
+use bth::Trees;
 use bth_cache::{Key, Record};
 use bth_format::SceneView;
 use bth_format::groups::Groups;
+use bth_format::layout::{CacheLine, NODE_LINES, NONE, Tree, kind};
 use bth_scene::Manifest;
 use std::path::Path;
+use zerocopy::IntoBytes;
+
+/// Lines of trees from which on a file holds them: placing the rows of smaller ones when the file is
+/// opened takes less than a millisecond.
+const MIN_TREE_LINES: usize = 200 * NODE_LINES;
 
 /// Compiles a scene; paths of the manifest count from `folder`, `name` names the scene in messages.
 ///
@@ -208,11 +215,19 @@ fn build(
         }
         super::images::write(&mut builder, &plan.sources, &objects, context)?;
         builder.provenance(provenance)?;
+        let mut to_disk = |bytes: &[u8]| context.keeper.keep_bytes(bytes);
+        builder.move_large(&mut to_disk)?;
+        let mut builder = builder.into_static();
+        let mut report = report(manifest, plan, &mut objects, &parts);
+        let Trees { trees, lines } = check(&objects, parts, &builder, name)?;
+        if lines.len() >= MIN_TREE_LINES {
+            builder.section(kind::TREES, NONE, size_of::<Tree>() as u32, trees.as_bytes().to_vec())?;
+            builder.section(kind::TREE_LINES, NONE, size_of::<CacheLine>() as u32, lines.as_bytes().to_vec())?;
+            builder.move_large(&mut to_disk)?;
+        }
         builder.check_limits()?;
-        builder.move_large(&mut |bytes| context.keeper.keep_bytes(bytes))?;
-        let content = Content::from(builder.into_static());
-        let report = report(manifest, plan, &mut objects, &parts, content.length());
-        check(&objects, parts, &content, name)?;
+        let content = Content::from(builder);
+        report.bytes = content.length();
         Ok::<_, Error>((content, report))
     })?;
     report.seconds = clock.into_times();
@@ -225,7 +240,6 @@ fn report(
     plan: &ScenePlan<'_>,
     objects: &mut Objects,
     parts: &SceneParts,
-    bytes: u64,
 ) -> SceneReport {
     let triangles = |object: u32| objects.reports[object as usize].triangles;
     let view = SceneView { nodes: &parts.nodes, instances: &parts.instances, ..SceneView::default() };
@@ -258,7 +272,7 @@ fn report(
         rate: manifest.frames.rate,
         triangles: objects.reports.iter().map(|o| o.triangles).sum(),
         instanced_triangles: written_out[world].1,
-        bytes,
+        bytes: 0,
         resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),
         worker: objects.worker.clone(),
         objects: std::mem::take(&mut objects.reports),
@@ -267,10 +281,17 @@ fn report(
 
 /// Checks the first frame as a reader does. The sections of the objects have been checked one by
 /// one before, so the check reads a file with their OBJECT rows only; the whole file where objects
-/// deform.
-fn check(objects: &Objects, parts: SceneParts, content: &Content, name: &Path) -> Result<()> {
+/// deform. Returns the trees that the file may hold.
+fn check(
+    objects: &Objects,
+    parts: SceneParts,
+    builder: &FileBuilder<'static>,
+    name: &Path,
+) -> Result<Trees> {
+    let whole = || Content::from(builder.clone());
     if !parts.deformers.deformers.is_empty() {
-        return bth::from_bytes(&content.bytes()?).map(drop).map_err(|e| refused(name, &e));
+        let opened = bth::from_bytes(&whole().bytes()?).map(drop);
+        return opened.map(|()| Trees::default()).map_err(|e| refused(name, &e));
     }
     let mut rows_only = FileBuilder::new();
     objects.write_rows(&mut rows_only)?;
@@ -279,10 +300,13 @@ fn check(objects: &Objects, parts: SceneParts, content: &Content, name: &Path) -
     // A scene may have millions of rows, so they are not in memory twice.
     drop(rows_only);
     drop(parts);
-    let Err(error) = bth::check_first_frame(&file) else { return Ok(()) };
+    let error = match bth::check_first_frame(&file) {
+        Ok(trees) => return Ok(trees),
+        Err(error) => error,
+    };
     // Reports the error of the whole file instead, so that offsets in messages are offsets in the
     // whole file.
-    let whole = bth_format::File::from_bytes(&content.bytes()?);
+    let whole = bth_format::File::from_bytes(&whole().bytes()?);
     let whole = whole.and_then(|whole| bth::check_first_frame(&whole));
     Err(refused(name, &whole.err().unwrap_or(error)))
 }

@@ -3,6 +3,8 @@
 use super::deformers;
 use crate::error::{Error, Result};
 use crate::write::{Names, SceneParts};
+use bth_format::SceneView;
+use bth_format::groups::Groups;
 use bth_format::layout as on_disk;
 use bth_format::layout::NONE;
 use bth_scene::{Lens, LightKind, Manifest, NodeGroups, Track, Transform};
@@ -105,18 +107,29 @@ pub(super) fn encode(
             reserved: [0; 4],
         });
         if let Some(object) = node.object.filter(|_| visible[index]).and_then(|object| objects[object]) {
-            parts.instances.push(on_disk::Instance { node: row as u32, object, flags: 0, reserved: 0 });
+            parts.instances.push(on_disk::Instance { node: row as u32, object, flags: 0, first: 0 });
         }
         if let Some(group) = node.group.filter(|_| visible[index]) {
             let (object, flags) = (row_of[group], on_disk::INSTANCE_OF_GROUP);
-            parts.instances.push(on_disk::Instance { node: row as u32, object, flags, reserved: 0 });
+            parts.instances.push(on_disk::Instance { node: row as u32, object, flags, first: 0 });
         }
     }
+    number_instances(&parts.nodes, &mut parts.instances);
     add_tracks(&mut parts, manifest, &row_of);
     add_cameras(&mut parts, &mut names, manifest, &row_of);
     add_lights(&mut parts, &mut names, manifest, &row_of);
     parts.names = names.bytes;
     Ok(parts)
+}
+
+/// Gives each row the number of its first instance. Where there are too many, the check of the scene
+/// says so.
+fn number_instances(nodes: &[on_disk::Node], instances: &mut [on_disk::Instance]) {
+    let view = SceneView { nodes, ..SceneView::default() };
+    match Groups::of(&view) {
+        Some(groups) => drop(groups.number(instances)),
+        None => (0..).zip(instances).for_each(|(row, instance)| instance.first = row),
+    }
 }
 
 /// Adds the cameras.

@@ -166,7 +166,7 @@ impl<'a> FileBuilder<'a> {
         take(self.header(&entries).as_bytes())?;
         take(entries.as_bytes())?;
         let mut end = self.table_end();
-        for (entry, section) in entries.iter().zip(self.sections.values()) {
+        for (entry, section) in self.in_place(&entries) {
             take(&[0; ALIGNMENT][..(entry.offset - end) as usize])?;
             section.bytes.read(section.hash, take)?;
             end = entry.offset + entry.length;
@@ -189,7 +189,7 @@ impl<'a> FileBuilder<'a> {
         front.copy_from_slice(&head);
         let mut end = head.len();
         let mut copies = Vec::with_capacity(entries.len());
-        for (entry, section) in entries.iter().zip(self.sections.values()) {
+        for (entry, section) in self.in_place(&entries) {
             let (_, section_and_rest) = rest.split_at_mut(entry.offset as usize - end);
             let (to, behind) = section_and_rest.split_at_mut(entry.length as usize);
             match section.bytes.in_memory() {
@@ -234,7 +234,7 @@ impl<'a> FileBuilder<'a> {
     }
 
     /// The same without borrows.
-    pub(crate) fn into_static(self) -> FileBuilder<'static> {
+    pub fn into_static(self) -> FileBuilder<'static> {
         let Self { sections, required_features } = self;
         let owned = |(key, section): (_, Section<'_>)| {
             let Section { flags, stride, hash, bytes } = section;
@@ -264,7 +264,7 @@ impl<'a> FileBuilder<'a> {
 
     /// Bytes of a file with these entries.
     fn end(&self, entries: &[SectionEntry]) -> u64 {
-        let end = entries.last().map_or(self.table_end(), |e| e.offset + e.length);
+        let end = entries.iter().map(|e| e.offset + e.length).fold(self.table_end(), u64::max);
         end.next_multiple_of(ALIGNMENT as u64)
     }
 
@@ -272,12 +272,29 @@ impl<'a> FileBuilder<'a> {
         (size_of::<Header>() + self.sections.len() * size_of::<SectionEntry>()) as u64
     }
 
+    /// The sections in the order in which they lie in the file.
+    fn in_place<'e>(
+        &self,
+        entries: &'e [SectionEntry],
+    ) -> impl Iterator<Item = (&'e SectionEntry, &Section<'a>)> {
+        let all = |first: bool| {
+            let sections = entries.iter().zip(self.sections.values());
+            sections.filter(move |(entry, _)| (entry.kind == kind::OBJECT) == first)
+        };
+        all(true).chain(all(false))
+    }
+
     fn entries(&self) -> Vec<SectionEntry> {
-        let mut end = self.table_end();
+        // OBJECT sections come first, so that what a reader needs of many objects is in one place.
+        let of_objects = self.sections.iter().filter(|((_, kind), _)| *kind == kind::OBJECT);
+        let rounded = |bytes: u64| bytes.next_multiple_of(ALIGNMENT as u64);
+        let mut first_end = self.table_end();
+        let mut end = first_end + of_objects.map(|(_, section)| rounded(section.bytes.len())).sum::<u64>();
         let entry = |(&(object, kind), section): (&(u32, u32), &Section)| {
+            let end = if kind == kind::OBJECT { &mut first_end } else { &mut end };
             let offset = end.next_multiple_of(ALIGNMENT as u64);
             let length = section.bytes.len();
-            end = offset + length;
+            *end = offset + length;
             SectionEntry {
                 kind,
                 flags: section.flags,

@@ -71,10 +71,10 @@ fn node(names: &str, row: usize, node: &Node) -> RowResult<()> {
 
 /// BTH-F154.
 fn instance(view: &SceneView<'_>, instance: &Instance, objects: u32) -> RowResult<()> {
-    let (flags, reserved) = (instance.flags, instance.reserved);
+    let flags = instance.flags;
     check_fields!(Instance {
         Instance node: (instance.node as usize) < view.nodes.len(), "a row of NODES", instance.node;
-        Instance flags: (flags & !INSTANCE_OF_GROUP, reserved) == (0, 0), "known flags", (flags, reserved);
+        Instance flags: flags & !INSTANCE_OF_GROUP == 0, "known flags", flags;
         Instance object: match instance.group() {
             None => instance.object < objects,
             Some(node) => view.nodes.get(node as usize).is_some_and(|node| node.flags & NODE_GROUP != 0),
@@ -83,9 +83,16 @@ fn instance(view: &SceneView<'_>, instance: &Instance, objects: u32) -> RowResul
     Ok(())
 }
 
-/// BTH-F188.
+/// BTH-F188, and BTH-F154 of the numbers of instances.
 fn groups(view: &SceneView<'_>) -> Result<()> {
-    let Some(groups) = Groups::of(view) else { return Ok(()) };
+    let Some(groups) = Groups::of(view) else {
+        return check_rows(kind::INSTANCES, view.instances, |row, instance| {
+            check_fields!(Instance {
+                Instance first: instance.first as usize == row, "the number of the row", instance.first;
+            });
+            Ok(())
+        });
+    };
     let at = |section, offset: usize, expected: &'static str, found: String| {
         Err(Error::within_file(Code::NodeGroups, section, offset as u64, expected, found))
     };
@@ -104,10 +111,20 @@ fn groups(view: &SceneView<'_>) -> Result<()> {
         }
         before = within;
     }
-    if let Err(found) = groups.written_out(view) {
+    let mut wrong = None;
+    let written_out = groups.written_out(view.instances, |row, first| {
+        let found = view.instances[row].first;
+        if found != first && wrong.is_none() {
+            let at = row * size_of::<Instance>() + std::mem::offset_of!(Instance, first);
+            let (expected, found) = (format!("{first} instances before"), format!("{found}"));
+            wrong = Some(Error::within_file(Code::Instance, kind::INSTANCES, at as u64, expected, found));
+        }
+    });
+    if let Err(found) = written_out {
         let expected = "at most 16 levels and fewer than 2^32 - 1 instances once groups are written out";
         return at(kind::INSTANCES, 0, expected, found);
     }
+    wrong.map_or(Ok(()), Err)?;
     let world_only = |section, size: usize, row: Option<usize>| match row {
         Some(row) => at(section, row * size, "a node of the world", "a node in a group".to_owned()),
         None => Ok(()),

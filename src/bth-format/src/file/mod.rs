@@ -31,15 +31,12 @@ use zerocopy::{FromBytes, Immutable, KnownLayout};
 #[derive(Clone, Debug)]
 pub struct File {
     buffer: Arc<Buffer>,
-    /// Per object and kind the row of the section table, or `NONE`.
-    rows: Arc<[[u32; OBJECT_KINDS]]>,
+    /// Per object the first row of the section table, and at the end the number of rows of objects.
+    rows: Arc<[u32]>,
     /// Per object its view, once it has been made. Views borrow from `buffer`; `'static` replaces a
     /// lifetime that cannot be named: see [`File::first_view`].
-    views: Arc<[OnceLock<ObjectView<'static>>]>,
+    views: Arc<[OnceLock<Box<ObjectView<'static>>>]>,
 }
-
-/// Kinds that belong to objects are below this.
-const OBJECT_KINDS: usize = kind::PROVENANCE as usize;
 
 /// A section: its table entry and its bytes.
 #[derive(Clone, Copy, Debug)]
@@ -148,14 +145,16 @@ impl File {
         }
         let objects = table::check(buffer.bytes(), buffer.bytes().len() as u64)?;
         let views = (0..objects).map(|_| OnceLock::new()).collect();
-        let mut rows = vec![[NONE; OBJECT_KINDS]; objects as usize];
         let (header, _) = Header::ref_from_prefix(buffer.bytes()).ok().expect("checked above");
-        for (row, entry) in table::entries(buffer.bytes(), header).iter().enumerate() {
-            let object = rows.get_mut(entry.object as usize);
-            if let Some(slot) = object.and_then(|kinds| kinds.get_mut(entry.kind as usize)) {
-                *slot = row as u32;
+        let of_objects = table::entries(buffer.bytes(), header).iter().take_while(|entry| entry.object != NONE);
+        let (mut rows, mut end) = (Vec::with_capacity(objects as usize + 1), 0);
+        for entry in of_objects {
+            if entry.kind == kind::OBJECT {
+                rows.push(end);
             }
+            end += 1;
         }
+        rows.push(end);
         Ok(Self { buffer: Arc::new(buffer), rows: rows.into(), views })
     }
 
@@ -175,7 +174,7 @@ impl File {
         table::entries(self.bytes(), self.header())
     }
 
-    /// The sections, in the order of the table, by ascending offset.
+    /// The sections, in the order of the table.
     pub fn sections(&self) -> impl ExactSizeIterator<Item = SectionView<'_>> {
         self.table().iter().map(|entry| self.section_of(entry))
     }
@@ -184,11 +183,12 @@ impl File {
     /// file lacks it.
     pub fn section(&self, object: u32, kind: u32) -> Option<SectionView<'_>> {
         let table = self.table();
-        let entry = match self.rows.get(object as usize).and_then(|kinds| kinds.get(kind as usize)) {
-            Some(&row) => table.get(row as usize)?,
-            None => &table[table.binary_search_by_key(&(object, kind), |e| (e.object, e.kind)).ok()?],
+        let rows = match self.rows.get(object as usize..).and_then(|rows| rows.first_chunk()) {
+            Some(&[first, end]) => &table[first as usize..end as usize],
+            None => &table[*self.rows.last()? as usize..],
         };
-        Some(self.section_of(entry))
+        let row = rows.binary_search_by_key(&(object, kind), |entry| (entry.object, entry.kind)).ok()?;
+        Some(self.section_of(&rows[row]))
     }
 
     /// The section of an entry of this file's table, which lies within the file (BTH-F012).
@@ -200,7 +200,7 @@ impl File {
     /// Number of objects in the file.
     #[inline]
     pub fn object_count(&self) -> u32 {
-        self.rows.len() as u32
+        self.views.len() as u32
     }
 
     /// BLAKE3 of what the sections hold, without provenance: equal for files that answer all rays
@@ -251,7 +251,7 @@ impl File {
     pub fn view(&self, object: u32) -> Result<&ObjectView<'_>> {
         // Every query comes here: the first view of an object is made out of line.
         match self.views.get(object as usize).and_then(OnceLock::get) {
-            Some(view) => Ok(view),
+            Some(view) => Ok(&**view),
             None => self.first_view(object),
         }
     }
@@ -261,7 +261,7 @@ impl File {
     #[inline(always)]
     pub fn sole_view(&self) -> Option<&ObjectView<'_>> {
         match &*self.views {
-            [view] => view.get(),
+            [view] => view.get().map(|view| &**view),
             _ => None,
         }
     }
@@ -278,7 +278,7 @@ impl File {
         // a borrow of `self`, so no view is used after `buffer` is gone. A view has no destructor,
         // so the order in which the fields of `self` are dropped does not matter.
         let view = unsafe { std::mem::transmute::<ObjectView<'_>, ObjectView<'static>>(view) };
-        Ok(self.views[object as usize].get_or_init(|| view))
+        Ok(self.views[object as usize].get_or_init(|| Box::new(view)))
     }
 
     fn make_view(&self, object: u32) -> Result<ObjectView<'_>> {

@@ -65,6 +65,7 @@ fn max_count(kind: u32) -> u64 {
         kind::TEXTURES | kind::COLORS | kind::IMAGES => (NONE - 1) as u64,
         kind::DEFORMATION..=kind::MORPH_DELTAS => (NONE - 1) as u64,
         kind if kind::is_scene(kind) => (NONE - 1) as u64,
+        kind::TREES | kind::TREE_LINES => (FACE_BIT - 1) as u64,
         _ => u64::MAX,
     }
 }
@@ -156,11 +157,15 @@ pub(super) fn check(bytes: &[u8], length: u64) -> Result<u32> {
         let at = offset_of!(Header, table_hash) as u64;
         return Err(Error::at(Code::TableHash, at, hex(&hash), hex(&header.table_hash)));
     }
-    let mut end = HEADER_SIZE as u64 + entries.len() as u64 * ENTRY_SIZE;
+    // The OBJECT sections lie in front of all others.
+    let of_objects = entries.iter().filter(|e| e.kind == kind::OBJECT);
+    let mut first_end = HEADER_SIZE as u64 + entries.len() as u64 * ENTRY_SIZE;
+    let mut end = of_objects.map(|e| e.offset.saturating_add(e.length)).fold(first_end, u64::max);
     for (i, e) in entries.iter().enumerate() {
         let previous = i.checked_sub(1).map(|p| &entries[p]);
-        end =
-            check_entry(e, previous, end, header.file_length).map_err(|(code, field, expected, found)| {
+        let end = if e.kind == kind::OBJECT { &mut first_end } else { &mut end };
+        *end =
+            check_entry(e, previous, *end, header.file_length).map_err(|(code, field, expected, found)| {
                 let at = HEADER_SIZE as u64 + i as u64 * ENTRY_SIZE + field as u64;
                 Error::within(code, e.kind, at, expected, found).in_object(e.object)
             })?;

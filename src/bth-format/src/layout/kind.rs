@@ -145,6 +145,10 @@ kinds! {
     SKIN_JOINTS = 59: SkinJoint;
     /// `f64`: weights of the morph targets of all deformers, where no track gives others.
     MORPH_WEIGHTS = 60: f64;
+    /// [`super::Tree`]s over the rows of groups that do not move, and of the world if it does not.
+    TREES = 61: Tree;
+    /// [`super::CacheLine`]s of the nodes of these trees.
+    TREE_LINES = 62: CacheLine;
     /// `[u32; 3]` per source triangle: rows of `SECOND_UVS`.
     SECOND_CORNERS = 68: [u32; 3];
     /// `[f32; 2]`: a second set of texture coordinates.
@@ -156,13 +160,16 @@ kinds! {
 /// Kind of trees for ranges of time in older files, which are refused (BTH-F007).
 pub(crate) const FORMER_SEGMENTS: u32 = 27;
 
-/// Returns true if sections of this kind are part of the scene.
+/// Returns true if sections of this kind are part of the scene. Trees only repeat what is in it.
 pub const fn is_scene(kind: u32) -> bool {
     SCENE <= kind && kind <= MORPH_WEIGHTS
 }
 /// Returns true if sections of this kind belong to the whole file.
 pub const fn is_of_file(kind: u32) -> bool {
-    (PROVENANCE <= kind && kind <= OBJECT_LABELS) || kind == IMAGES || kind == IMAGE_BYTES || is_scene(kind)
+    (PROVENANCE <= kind && kind <= OBJECT_LABELS)
+        || kind == IMAGES
+        || kind == IMAGE_BYTES
+        || (SCENE <= kind && kind <= TREE_LINES)
 }
 /// Returns true if sections of this kind say how an object's vertices move by themselves.
 pub const fn is_sequence(kind: u32) -> bool {

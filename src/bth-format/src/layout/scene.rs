@@ -60,8 +60,9 @@ pub struct Instance {
     pub object: u32,
     /// [`INSTANCE_OF_GROUP`].
     pub flags: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Number of its first instance among those of its group, or of the world, once groups are
+    /// written out.
+    pub first: u32,
 }
 
 /// Flag of [`Instance`]: it is an instance of a group.
@@ -72,6 +73,40 @@ impl Instance {
     pub fn group(&self) -> Option<u32> {
         (self.flags & INSTANCE_OF_GROUP != 0).then_some(self.object)
     }
+}
+
+/// A tree over the rows of a group of nodes, or of the world. Specification: "Trees".
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Tree {
+    /// Bound of the absolute coordinates that points of the group have on the way from their
+    /// objects.
+    pub magnitude: f64,
+    /// Bound of the condition numbers of products of transforms in the group.
+    pub condition: f64,
+    /// Row of `TREE_LINES` of its root.
+    pub first_line: u32,
+    /// Number of its lines.
+    pub lines: u32,
+    /// Max number of nodes on a path from the root.
+    pub depth: u32,
+    /// The first row of `INSTANCES` of the group.
+    pub first_row: u32,
+    /// Number of rows of the group.
+    pub rows: u32,
+    /// Number of its visible rows, which the tree holds.
+    pub visible: u32,
+    /// Number of its instances once groups are written out.
+    pub instances: u32,
+    /// Max absolute coordinate of the boxes of its visible rows.
+    pub extent: f32,
+    /// Max of what the boxes of its visible rows grow by, for each unit of distance of a ray's
+    /// origin.
+    pub origin_slack: f32,
+    /// The row of `NODES` behind the last node of the group.
+    pub end_node: u32,
+    /// Zero.
+    pub reserved: [u32; 2],
 }
 
 /// Keyframes of one property of one node.
@@ -214,7 +249,9 @@ pub struct Light {
 assert_layout! {
     Scene 64 { first_frame 8, last_frame 12, camera 16, reserved 20 }
     Node 128 { parent 96, flags 100, name 104, name_length 108, reserved 112 }
-    Instance 16 { object 4, flags 8, reserved 12 }
+    Instance 16 { object 4, flags 8, first 12 }
+    Tree 64 { condition 8, first_line 16, lines 20, depth 24, first_row 28, rows 32, visible 36, instances 40,
+        extent 44, origin_slack 48, end_node 52, reserved 56 }
     Track 32 { property 4, interpolation 8, keys 12, first_time 16, first_value 20, reserved 24 }
     Camera 64 { projection 4, name 8, name_length 12, size 16, aspect 24, near 32, far 40, reserved 48 }
     Light 80 { kind 4, name 8, name_length 12, color 16, intensity 40, range 48, inner 56, outer 64, reserved 72 }

@@ -6,6 +6,7 @@ mod free;
 mod source;
 mod tet_leaf;
 mod tree;
+mod trees;
 mod triangle_set;
 
 use crate::error::{Code, Error, Result};
@@ -38,14 +39,16 @@ pub struct Report {
 ///
 /// # Errors
 /// All damaged sections and gaps, and for each object the first violation; at least one error.
-/// Codes are `BTH-F020`, `BTH-F021` and `BTH-F101` to `BTH-F211`. The scene sections count as one
+/// Codes are `BTH-F020`, `BTH-F021` and `BTH-F101` to `BTH-F213`. The scene sections count as one
 /// object.
 pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
     let mut errors = Vec::new();
     let mut report =
         Report { bytes: file.bytes().len() as u64, objects: file.object_count(), ..Report::default() };
     let mut end = size_of::<Header>() + size_of_val(file.table());
-    for section in file.sections() {
+    let (first, others): (Vec<_>, Vec<_>) =
+        file.sections().partition(|section| section.entry.kind == kind::OBJECT);
+    for section in first.into_iter().chain(others) {
         let e = section.entry;
         check_gap(file, end, e.offset as usize, &mut errors);
         end = (e.offset + e.length) as usize;
@@ -61,7 +64,7 @@ pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
     }
     errors.extend(file.check_object_names().err());
     errors.extend(file.check_images().err());
-    errors.extend(file.check_scene().err());
+    errors.extend(file.check_scene().and_then(|_| trees::check(file).map_err(|e| file.locate(e, NONE))).err());
     if errors.is_empty() { Ok(report) } else { Err(errors) }
 }
 

@@ -33,6 +33,10 @@ section_view! {
         skin_joints: SkinJoint = SKIN_JOINTS,
         /// Weights of the deformers' morph targets, before tracks.
         morph_weights: f64 = MORPH_WEIGHTS,
+        /// Trees over the rows of groups, and of the world. Not checked with the other sections.
+        trees: Tree = TREES,
+        /// The nodes of the trees.
+        tree_lines: CacheLine = TREE_LINES,
     }
 }
 

@@ -28,7 +28,7 @@ impl DeformerPoses<'_> {
     /// # Panics
     /// If the sections do not fit each other.
     pub fn positions_at(&self, seconds: f64) -> Vec<[f32; 3]> {
-        let mut hierarchy = NodeHierarchy::new(&self.view);
+        let mut hierarchy = NodeHierarchy::new(&self.view, 0);
         hierarchy.update(&self.view, seconds, true);
         let pose = Pose::of(&mut SkinMatrices::new(&self.view, &hierarchy), &self.deformer, seconds);
         let vertices = Vertices { base: self.base, deformation: self.deformation };

@@ -44,7 +44,7 @@ impl Subscene {
         Subscene {
             first_object,
             ids: Vec::new(),
-            hierarchy: view.map(|view| NodeHierarchy::new(&view)),
+            hierarchy: view.map(|view| NodeHierarchy::new(&view, 0)),
             pose: SubscenePose { transform, seconds, visible: true },
             evaluated: None,
         }

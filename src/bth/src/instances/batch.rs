@@ -150,7 +150,10 @@ impl World {
     /// The placement of an instance that is in the top level.
     #[inline]
     pub(crate) fn placement(&self, instance: u32) -> &Placement {
-        self.placements[instance as usize].as_ref().expect("the top level holds visible instances")
+        match self.placements.get(instance as usize) {
+            Some(Some(placement)) => placement,
+            _ => self.stored_placement(instance).expect("the top level holds visible instances"),
+        }
     }
 
     /// Traces all queued visits, object by object, and empties the queue.
@@ -168,7 +171,7 @@ impl World {
     /// object may come several times.
     pub(super) fn by_object(&self, visits: &mut VisitQueue, mut work: impl FnMut(u32, &[Visit])) {
         // Neighbouring rays through one instance remain coherent in its space.
-        visits.sort(self.placements.len());
+        visits.sort(self.row_count());
         let VisitQueue { sorted, short_runs, gathered, .. } = &mut *visits;
         short_runs.clear();
         let mut first = 0;

@@ -163,7 +163,7 @@ impl World {
             let TransformSource::Caller(CallerInstances { rows, .. }) = &self.source else { break };
             let NewInstance { row: InstanceRow { to_world, .. }, visible } = rows[row as usize];
             if let Some(groups) = self.groups_mut() {
-                groups.stage(row as usize, &to_world, visible);
+                groups.stage(row, &to_world, visible);
             }
         }
         self.update_groups(objects, std::iter::empty())

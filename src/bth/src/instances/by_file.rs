@@ -1,7 +1,9 @@
 //! The instances of a file with scene sections at a time.
 
 use super::groups::{self, RowPlace, object_of_group};
-use super::placement::PlacementError;
+use super::placement::{PlacementError, Unplaceable};
+use super::stored::StoredRows;
+use super::top_level::TopLevel;
 use super::world::{InstanceRow, NewInstance, TransformSource, World, scene_of};
 use crate::animation::{AnimatedFile, StagedPoses};
 use crate::clock;
@@ -9,9 +11,11 @@ use crate::nodes::affine::Affine;
 use crate::nodes::hierarchy::NodeHierarchy;
 use crate::objects::Objects;
 use crate::update::Update;
+use bth_format::SceneView;
 use bth_format::error::{Error, Result};
 use bth_format::groups::Groups;
 use bth_format::layout::*;
+use std::sync::Arc;
 
 /// Rows that are placed at a time, so that few placements are in memory twice.
 const CHUNK: usize = 1 << 16;
@@ -26,10 +30,71 @@ impl World {
         let Some(file) = objects.sole_file() else { return Ok(None) };
         let Some(view) = file.check_scene()? else { return Ok(None) };
         let scene = &view.scene[0];
+        World::placed_at(objects, &view, f64::from(scene.first_frame) / scene.rate).map(Some)
+    }
+
+    /// Like [`Self::new`], with the trees of the file, and without checking anything in the scene
+    /// sections. `None` if the file has no trees.
+    ///
+    /// # Errors
+    /// Those of [`Self::update`].
+    pub(crate) fn with_trees(objects: &Objects) -> Result<Option<World>> {
+        let Some(file) = objects.sole_file() else { return Ok(None) };
+        let (Some(view), Some(stored)) = (file.scene(), StoredRows::of(file)) else { return Ok(None) };
+        let [scene] = view.scene else { return Ok(None) };
         let seconds = f64::from(scene.first_frame) / scene.rate;
-        let source = TransformSource::File(NodeHierarchy::new(&view));
+        let source = TransformSource::File(NodeHierarchy::new(&view, stored.nodes()));
+        let rows = &view.instances[stored.rows() as usize..];
+        let mut world = World::unplaced(source, seconds, rows.len(), file.object_count());
+        let stored = Arc::new(stored);
+        world.stored = Some(Arc::clone(&stored));
+        if stored.groups() > 0 {
+            let within = stored.groups();
+            let place = |instance: &Instance| RowPlace { object: stored.shown(instance), within };
+            let groups = groups::Groups::of_file(&stored, rows.iter().map(place));
+            world.set_groups(groups.expect("a file whose scene has been checked"));
+        }
+        world.top.first_row = stored.rows();
+        if let Some(tree) = stored.trees().last().filter(|_| stored.holds_world()) {
+            world.top = TopLevel::stored(file, tree);
+        }
+        world.evaluate_nodes(objects, seconds, true);
+        world.place_moved(objects, seconds, &[], true)?;
+        Ok(Some(world))
+    }
+
+    /// Places the rows that were in trees of the file, so that they can be changed.
+    ///
+    /// # Errors
+    /// The first row that cannot be placed.
+    pub(super) fn place_stored(&mut self, objects: &Objects) -> std::result::Result<(), Unplaceable> {
+        if self.stored.is_none() {
+            return Ok(());
+        }
+        let traced = std::mem::take(&mut self.traced);
+        let placed = World::placed_at(objects, &scene_of(objects), self.seconds);
+        match placed {
+            Ok(mut world) => {
+                world.traced = traced;
+                *self = world;
+            }
+            Err(_) => {
+                self.traced = traced;
+                return Err(Unplaceable { instance: 0, error: PlacementError::NotFinite });
+            }
+        }
+        Ok(())
+    }
+
+    /// The instances of a file at a time. Its scene has been checked.
+    ///
+    /// # Errors
+    /// Those of [`Self::update`].
+    fn placed_at(objects: &Objects, view: &SceneView<'_>, seconds: f64) -> Result<World> {
+        let file = objects.sole_file().expect("a file with a scene");
+        let source = TransformSource::File(NodeHierarchy::new(view, 0));
         let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
-        if let Some(groups) = Groups::of(&view) {
+        if let Some(groups) = Groups::of(view) {
             let place = |instance: &Instance| RowPlace {
                 object: instance
                     .group()
@@ -42,7 +107,7 @@ impl World {
         world.animation.add(file, 0);
         world.evaluate_nodes(objects, seconds, true);
         world.place_moved(objects, seconds, &[], true)?;
-        Ok(Some(world))
+        Ok(world)
     }
 
     /// An instance of each object, in its place. It has the index of the object.
@@ -153,13 +218,16 @@ impl World {
             false => hierarchy.hidden(of.node),
         };
         let (mut moved, mut placed) = (Vec::new(), Vec::new());
-        for (first, rows) in view.instances.chunks(CHUNK).enumerate() {
+        let first_row = self.first_row();
+        for (first, rows) in view.instances[first_row as usize..].chunks(CHUNK).enumerate() {
             let TransformSource::File(hierarchy) = &self.source else { break };
+            let first = first_row + (first * CHUNK) as u32;
             moved.clear();
-            moved.extend((0..rows.len() as u32).map(|i| (first * CHUNK) as u32 + i).filter(|row| {
-                let (row, of) = (*row as usize, &view.instances[*row as usize]);
+            moved.extend((0..rows.len() as u32).map(|i| first + i).filter(|row| {
+                let of = &view.instances[*row as usize];
+                let is_placed = self.placements[(*row - first_row) as usize].is_some();
                 let moves = match is_skinned(self, of) {
-                    true => all || hides(hierarchy, of, true) != self.placements[row].is_none(),
+                    true => all || hides(hierarchy, of, true) == is_placed,
                     false => hierarchy.moved(of.node),
                 };
                 moves
@@ -182,13 +250,13 @@ impl World {
                 None => Vec::new(),
             };
             for (row, placed) in moved.iter().zip(&placed) {
-                self.placements[*row as usize] = placed.map_err(|error| failed(*row, error))?;
+                self.placements[(*row - first_row) as usize] = placed.map_err(|error| failed(*row, error))?;
             }
             if let Some(groups) = self.groups_mut() {
                 for (row, NewInstance { row: InstanceRow { to_world, .. }, visible }) in
                     moved.iter().zip(&staged)
                 {
-                    groups.stage(*row as usize, to_world, *visible);
+                    groups.stage(*row, to_world, *visible);
                 }
             }
             update.placed += moved.len();
@@ -209,7 +277,8 @@ impl World {
     /// If there is no such node, as where the caller places the instances.
     pub(crate) fn node(&self, objects: &Objects, node: u32) -> ([[f64; 4]; 3], bool) {
         let TransformSource::File(hierarchy) = &self.source else { panic!("expected a file with nodes") };
-        (hierarchy.to_world(&scene_of(objects), node).rows(), !hierarchy.hidden(node))
+        let view = scene_of(objects);
+        (hierarchy.to_world(&view, node).rows(), !hierarchy.hidden_of(&view, node))
     }
 }
 

@@ -5,7 +5,7 @@ use super::World;
 use super::box_tests::{entered, limit, widened_slabs};
 use super::instance_list::{InstanceList, InstanceReceiver};
 use super::top_level::TopLevel;
-use super::top_nodes::INSTANCE;
+use super::top_nodes::{INSTANCE, TopNodes};
 use crate::bvh::ray_state::key_limit;
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::stack::BOTTOM;
@@ -42,14 +42,14 @@ impl World {
         visit: &mut dyn FnMut(u32) -> Option<f64>,
     ) -> bool {
         let point = LanePoint::new(point, self.top.greatest_coordinate());
-        !self.top.is_empty() && run_walk(&self.top, &mut PointInstances { point, squared, visit })
+        !self.top.is_empty() && run_walk(&self.top.nodes(), &mut PointInstances { point, squared, visit })
     }
 
     /// Calls `visit` with each visible instance whose box may overlap a region, until it returns
     /// true. Returns true then.
     pub(super) fn rows_in_box(&self, region: [[f64; 3]; 2], visit: &mut dyn FnMut(u32) -> bool) -> bool {
         let region = RegionBox::in_world(region, self.top.greatest_coordinate());
-        !self.top.is_empty() && run_walk(&self.top, &mut BoxInstances { region, visit })
+        !self.top.is_empty() && run_walk(&self.top.nodes(), &mut BoxInstances { region, visit })
     }
 }
 
@@ -59,14 +59,14 @@ trait InstanceQuery: BoxQuery {
     fn instance(&mut self, instance: u32) -> bool;
 }
 
-impl<Q: InstanceQuery> Tree<Q> for TopLevel {
+impl<Q: InstanceQuery> Tree<Q> for TopNodes<'_> {
     #[inline(always)]
     fn root(&self) -> u32 {
         0
     }
     #[inline(always)]
     fn node(&self, code: u32) -> &WideNode {
-        TopLevel::node(self, code)
+        TopNodes::node(self, code)
     }
     #[inline(always)]
     fn leaf<S: Simd>(&self, _: S, _: &Q::Constants<S>, code: u32, query: &mut Q, _limit: f32) -> bool {
@@ -149,7 +149,7 @@ fn walk_ray<S: Simd>(
         return list.visit(slabs.scale, ray.tmax, visit);
     }
     let mut query = RayInstances { slabs, tmax: ray.tmax, last, visit };
-    walk(s, top, &mut query, &mut SingleStack::new())
+    walk(s, &top.nodes(), &mut query, &mut SingleStack::new())
 }
 
 /// The instances that a ray may enter.

@@ -152,7 +152,7 @@ impl PointWalk<'_> {
         let squared = || placed.squared_in_object(limit(), off);
         let point = LanePoint::new(point, group.top.greatest_coordinate());
         let (now, visit) = (squared(), &mut |row| (!self.row(&level, row)).then(squared));
-        run_walk(&group.top, &mut PointInstances { point, squared: now, visit })
+        run_walk(&group.top.nodes(), &mut PointInstances { point, squared: now, visit })
     }
 }
 
@@ -179,6 +179,6 @@ impl RegionWalk<'_> {
         let region = self.region.map(|end| minus(end, to_world.translation));
         let (greatest, off) = (group.top.greatest_coordinate(), group.off_in_world(&to_world));
         let region = RegionBox::new(region, &to_world.linear, greatest, off);
-        run_walk(&group.top, &mut BoxInstances { region, visit: &mut |row| self.row(&level, row) })
+        run_walk(&group.top.nodes(), &mut BoxInstances { region, visit: &mut |row| self.row(&level, row) })
     }
 }

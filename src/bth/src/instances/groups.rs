@@ -7,6 +7,7 @@
 //! With it, an instance is what it would be in a scene without groups.
 
 use super::placement::{PartBoxes, Placement, PlacementError, Unplaceable};
+use super::stored::StoredRows;
 use super::top_level::TopLevel;
 use super::top_nodes::used;
 use crate::intersect::vector::max_norm;
@@ -14,6 +15,8 @@ use crate::nodes::affine::{Accuracy, Affine, Inverse};
 use crate::objects::Objects;
 use bth_format::layout::{NONE, Object};
 use bth_format::limits::MAX_PATH;
+use std::ops::Range;
+use std::sync::Arc;
 use zerocopy::FromZeros;
 
 /// Bit of the object of a row that shows a group; the other bits are its number.
@@ -50,29 +53,39 @@ pub(super) struct GroupRow {
     object: u32,
     /// The number of its first instance among the instances of its group.
     first: u32,
-    visible: bool,
+    /// False if it hides what it shows.
+    pub(super) visible: bool,
     /// True if it has to be placed again.
     moved: bool,
     /// True if it was visible when it was placed last.
     was_visible: bool,
 }
 
+impl GroupRow {
+    /// A row in a tree of the file.
+    pub(super) fn stored(to_outer: Affine, object: u32, first: u32, visible: bool) -> GroupRow {
+        GroupRow { to_outer, object, first, visible, moved: false, was_visible: visible }
+    }
+}
+
 /// A group, or the world.
 #[derive(Debug, Default)]
 pub(super) struct NodeGroup {
-    /// Its rows, ascending.
+    /// Its rows, ascending; none if they are in a tree of the file.
     pub(super) rows: Vec<u32>,
+    /// Its rows in a tree of the file.
+    stored: Range<u32>,
     /// The tree over its rows; not of the world, which has its own.
     pub(super) top: TopLevel,
     /// Number of instances once groups are written out.
-    count: u32,
+    pub(super) count: u32,
     /// Its box, and boxes that contain all of it; `None` if nothing in it is visible.
     boxes: Option<Box<(Object, PartBoxes)>>,
     /// Max |coordinate| that a point of it may have on the way from its object: a bound of sums of
     /// norms of products.
-    magnitude: f64,
+    pub(super) magnitude: f64,
     /// Bound of the condition numbers of the products of transforms in it.
-    condition: f64,
+    pub(super) condition: f64,
     changed: bool,
 }
 
@@ -150,6 +163,9 @@ pub(super) struct FoundInstance {
 /// The groups of a scene.
 #[derive(Debug, Default)]
 pub(crate) struct Groups {
+    /// The rows in trees of the file.
+    stored: Option<Arc<StoredRows>>,
+    /// The rows behind them.
     rows: Vec<GroupRow>,
     /// Groups before those that show them, the world last.
     groups: Vec<NodeGroup>,
@@ -169,8 +185,45 @@ impl Groups {
     pub(super) fn new(places: impl Iterator<Item = RowPlace>, count: u32) -> Option<Groups> {
         let mut groups = Groups::default();
         groups.groups.resize_with(count as usize + 1, NodeGroup::default);
+        groups.add(places, count).then_some(groups)
+    }
+
+    /// The groups of a file with trees; `places` are the rows that no tree holds. `None` as in
+    /// [`Self::new`].
+    pub(super) fn of_file(
+        stored: &Arc<StoredRows>,
+        places: impl Iterator<Item = RowPlace>,
+    ) -> Option<Groups> {
+        let (trees, count) = (stored.trees(), stored.groups());
+        let mut groups = Groups { stored: Some(Arc::clone(stored)), ..Groups::default() };
+        groups.groups.resize_with(count as usize + 1, NodeGroup::default);
+        for (group, tree) in groups.groups.iter_mut().zip(trees) {
+            *group = NodeGroup {
+                stored: tree.first_row..tree.first_row.saturating_add(tree.rows),
+                top: TopLevel::stored(stored.file(), tree),
+                count: tree.instances,
+                magnitude: tree.magnitude,
+                condition: tree.condition,
+                ..NodeGroup::default()
+            };
+        }
+        if !groups.add(places, count) {
+            return None;
+        }
+        for shown in groups.rows.iter().filter_map(|row| group_in(row.object)) {
+            let group = &mut groups.groups[shown];
+            if group.boxes.is_none() && !group.stored.is_empty() {
+                group.boxes = group.boxes_of_top();
+            }
+        }
+        Some(groups)
+    }
+
+    /// Adds rows to groups, and counts the instances. Returns false if there are too many.
+    fn add(&mut self, places: impl Iterator<Item = RowPlace>, count: u32) -> bool {
+        let (base, groups) = (self.first_row(), self);
         for RowPlace { object, within } in places {
-            let row = groups.rows.len() as u32;
+            let row = base + groups.rows.len() as u32;
             groups.rows.push(GroupRow {
                 to_outer: Affine::IDENTITY,
                 object,
@@ -187,17 +240,42 @@ impl Groups {
         for number in 0..groups.groups.len() {
             let (before, group) = groups.groups.split_at_mut(number);
             for row in &group[0].rows {
-                let row = &mut groups.rows[*row as usize];
+                let row = &mut groups.rows[(*row - base) as usize];
                 row.first = group[0].count;
                 let (instances, below) = match group_in(row.object) {
                     Some(shown) => (before[shown].count, levels[shown]),
                     None => (1, 0),
                 };
                 levels[number] = levels[number].max(below + 1);
-                group[0].count = group[0].count.checked_add(instances).filter(|sum| *sum < NONE)?;
+                let Some(sum) = group[0].count.checked_add(instances).filter(|sum| *sum < NONE) else {
+                    return false;
+                };
+                group[0].count = sum;
             }
         }
-        levels.iter().all(|levels| *levels <= MAX_PATH).then_some(groups)
+        levels.iter().all(|levels| *levels <= MAX_PATH)
+    }
+
+    /// Number of rows in trees of the file, which come before the others.
+    fn first_row(&self) -> u32 {
+        self.stored.as_ref().map_or(0, |stored| stored.rows())
+    }
+
+    /// A row.
+    #[inline(always)]
+    fn row(&self, row: u32) -> &GroupRow {
+        match &self.stored {
+            Some(stored) if row < stored.rows() => stored.row(row),
+            _ => &self.rows[(row - self.first_row()) as usize],
+        }
+    }
+
+    /// The number of the first instance of a row among those of its group.
+    fn first_of(&self, row: u32) -> u32 {
+        match &self.stored {
+            Some(stored) if row < stored.rows() => stored.first(row),
+            _ => self.row(row).first,
+        }
     }
 
     /// Number of instances once groups are written out.
@@ -207,6 +285,11 @@ impl Groups {
 
     pub(super) fn group(&self, level: &Level) -> &NodeGroup {
         &self.groups[level.group]
+    }
+
+    /// The groups, the world last.
+    pub(super) fn each(&self) -> &[NodeGroup] {
+        &self.groups
     }
 
     /// The rows of the world.
@@ -220,12 +303,13 @@ impl Groups {
     }
 
     /// Returns true if a row shows a group.
-    pub(super) fn shows_group(&self, row: usize) -> bool {
-        group_in(self.rows[row].object).is_some()
+    pub(super) fn shows_group(&self, row: u32) -> bool {
+        group_in(self.row(row).object).is_some()
     }
 
     /// Notes how a row is to be placed. Rows of objects are placed by the caller.
-    pub(super) fn stage(&mut self, row: usize, to_outer: &Affine, visible: bool) {
+    pub(super) fn stage(&mut self, row: u32, to_outer: &Affine, visible: bool) {
+        let row = (row - self.first_row()) as usize;
         let row = &mut self.rows[row];
         (row.to_outer, row.visible, row.moved) = (*to_outer, visible, true);
     }
@@ -236,14 +320,15 @@ impl Groups {
     }
 
     /// Notes that a row of an object has been placed again.
-    pub(super) fn touch(&mut self, row: usize) {
+    pub(super) fn touch(&mut self, row: u32) {
+        let row = (row - self.first_row()) as usize;
         self.rows[row].moved = true;
     }
 
     /// What a row of a level shows.
     #[inline(always)]
     pub(super) fn show(&self, level: &Level, row: u32) -> Shown {
-        let row = &self.rows[row as usize];
+        let row = self.row(row);
         let to_world = match &level.to_world {
             Some(outer) => outer.times(&row.to_outer),
             None => row.to_outer,
@@ -260,10 +345,17 @@ impl Groups {
     pub(super) fn find(&self, instance: u32) -> FoundInstance {
         let (mut level, mut path) = (self.world(), InstancePath::default());
         loop {
-            let rows = &self.group(&level).rows;
-            let first = |row: &u32| level.first + self.rows[*row as usize].first;
+            let group = self.group(&level);
             // Of rows with the same number all but the last show empty groups.
-            let row = rows[rows.partition_point(|row| first(row) <= instance) - 1];
+            let (mut first, mut end) = (0, group.len());
+            while end - first > 1 {
+                let middle = first + (end - first) / 2;
+                match level.first + self.first_of(group.row(middle)) <= instance {
+                    true => first = middle,
+                    false => end = middle,
+                }
+            }
+            let row = group.row(first);
             path.push(row);
             let Shown { to_world, content } = self.show(&level, row);
             match content {
@@ -284,12 +376,14 @@ impl Groups {
         max_cost: f64,
     ) -> Result<bool, Unplaceable> {
         let (mut same_visible, world) = (true, self.groups.len() - 1);
+        let first_row = self.first_row();
         for number in 0..self.groups.len() {
             let (before, group) = self.groups.split_at_mut(number);
             let group = &mut group[0];
             (same_visible, group.changed) = (true, false);
             for &row in &group.rows {
-                let (data, placement) = (&mut self.rows[row as usize], &mut placements[row as usize]);
+                let at = (row - first_row) as usize;
+                let (data, placement) = (&mut self.rows[at], &mut placements[at]);
                 if let Some(shown) = group_in(data.object) {
                     if !(data.moved || before[shown].changed) {
                         continue;
@@ -307,7 +401,7 @@ impl Groups {
             }
             // The tree of a group without rows is empty.
             if group.changed {
-                group.measure(objects, (&self.rows, before), placements);
+                group.measure(objects, (&self.rows, before, first_row), placements);
                 if number != world {
                     group.place(placements, same_visible, max_cost);
                 }
@@ -327,11 +421,16 @@ impl Groups {
         (level, condition): (&Level, f64),
         left: &mut usize,
     ) -> Option<u32> {
-        for &row in &self.group(level).rows {
-            let Some(placement) = &placements[row as usize] else { continue };
-            let shown = group_in(self.rows[row as usize].object);
+        let (group, first_row) = (self.group(level), self.first_row());
+        for row in (0..group.len()).map(|i| group.row(i)) {
+            let accuracy = match row.checked_sub(first_row) {
+                Some(at) => placements[at as usize].as_ref().map(|placement| placement.accuracy),
+                None => Some(self.row(row)).filter(|row| row.visible).and_then(|row| Some(row.to_outer.inverse()?.1)),
+            };
+            let Some(accuracy) = accuracy else { continue };
+            let shown = group_in(self.row(row).object);
             let inner = shown.map_or(1.0, |group| self.groups[group].condition);
-            if condition * placement.accuracy.condition() * inner <= SAFE_CONDITION {
+            if condition * accuracy.condition() * inner <= SAFE_CONDITION {
                 continue;
             }
             let Shown { to_world, content } = self.show(level, row);
@@ -347,6 +446,25 @@ impl Groups {
         None
     }
 
+    /// The placement of a row in a tree of the file, with its box; `None` if it is not visible.
+    pub(super) fn box_of_stored(&self, objects: &Objects, row: u32) -> Option<Placement> {
+        let GroupRow { to_outer, object, visible, .. } = self.row(row);
+        if !visible {
+            return None;
+        }
+        match group_in(*object) {
+            Some(shown) => {
+                let (header, parts) = *self.groups[shown].boxes_of_top()?;
+                Placement::new(to_outer, shown as u32, &header, &parts).ok()
+            }
+            None => {
+                let header = objects.header(*object);
+                let parts = PartBoxes::whole(header, objects.anchor(*object));
+                Placement::new(to_outer, *object, header, &parts).ok()
+            }
+        }
+    }
+
     /// Bytes on the heap.
     pub(super) fn bytes(&self) -> usize {
         let group = |group: &NodeGroup| {
@@ -360,17 +478,28 @@ impl Groups {
 }
 
 impl NodeGroup {
+    /// Number of rows.
+    fn len(&self) -> u32 {
+        if self.stored.is_empty() { self.rows.len() as u32 } else { self.stored.end - self.stored.start }
+    }
+
+    /// Row `i` of the group.
+    fn row(&self, i: u32) -> u32 {
+        if self.stored.is_empty() { self.rows[i as usize] } else { self.stored.start + i }
+    }
+
     /// Computes the bounds of what is in the group. The groups before are known.
     fn measure(
         &mut self,
         objects: &Objects,
-        (rows, before): (&[GroupRow], &[NodeGroup]),
+        (rows, before, first_row): (&[GroupRow], &[NodeGroup], u32),
         placements: &[Option<Placement>],
     ) {
         (self.magnitude, self.condition) = (0.0, 1.0);
         for &row in &self.rows {
-            let Some(placement) = &placements[row as usize] else { continue };
-            let GroupRow { to_outer, object, .. } = &rows[row as usize];
+            let at = (row - first_row) as usize;
+            let Some(placement) = &placements[at] else { continue };
+            let GroupRow { to_outer, object, .. } = &rows[at];
             let (magnitude, condition) = match group_in(*object) {
                 Some(group) => (before[group].magnitude, before[group].condition),
                 None => {
@@ -393,16 +522,21 @@ impl NodeGroup {
         if !same_visible || self.top.cost_ratio() > max_cost {
             self.top.build(placements, Some(&self.rows));
         }
+        self.boxes = self.boxes_of_top();
+    }
+
+    /// The boxes of the root of the tree; `None` if nothing is visible.
+    fn boxes_of_top(&self) -> Option<Box<(Object, PartBoxes)>> {
         if self.top.is_empty() {
-            self.boxes = None;
-            return;
+            return None;
         }
-        let (mut header, root) = (Object::new_zeroed(), self.top.node(0));
+        let (mut header, nodes) = (Object::new_zeroed(), self.top.nodes());
+        let root = nodes.node(0);
         for k in 0..3 {
             header.lower[k] = root.bounds[k][0].iter().fold(f32::MAX, |least, x| least.min(*x));
             header.upper[k] = root.bounds[k][1].iter().fold(f32::MIN, |most, x| most.max(*x));
         }
         let parts = PartBoxes::new(used(root), &root.bounds, [0.0; 3]);
-        self.boxes = Some(Box::new((header, parts)));
+        Some(Box::new((header, parts)))
     }
 }

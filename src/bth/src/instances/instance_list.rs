@@ -6,7 +6,7 @@
 
 use super::box_tests::{entered, limit};
 use super::top_level::TopLevel;
-use super::top_nodes::INSTANCE;
+use super::top_nodes::{INSTANCE, TopNodes};
 use crate::bvh::ray_state::key_limit;
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::simd::{LANES, Simd};
@@ -38,7 +38,8 @@ impl InstanceList {
     #[inline(always)]
     pub(super) fn of<S: Simd>(s: S, top: &TopLevel, slabs: &RaySlabs, last: f32) -> Option<InstanceList> {
         let planes = RaySlabLanes::new(s, slabs);
-        let root = Met::of(s, top, 0, &planes, last);
+        let tree = top.nodes();
+        let root = Met::of(s, tree, 0, &planes, last);
         let mut list = InstanceList { codes: [0; LANES], keys: [0.0; LANES], count: 0 };
         if root.nodes == 0 {
             list.sort(s, root.instances, root.depths, root.codes);
@@ -58,7 +59,7 @@ impl InstanceList {
             if next == end {
                 break;
             }
-            met = Met::of(s, top, nodes[next], &planes, last);
+            met = Met::of(s, tree, nodes[next], &planes, last);
             next += 1;
         }
         let instances = ((1u64 << count) - 1) as u32;
@@ -104,8 +105,8 @@ struct Met<S: Simd> {
 
 impl<S: Simd> Met<S> {
     #[inline(always)]
-    fn of(s: S, top: &TopLevel, code: u32, planes: &RaySlabLanes<S>, last: f32) -> Met<S> {
-        let node = top.node(code);
+    fn of(s: S, tree: TopNodes<'_>, code: u32, planes: &RaySlabLanes<S>, last: f32) -> Met<S> {
+        let node = tree.node(code);
         let (entered, depths) = entered(s, planes, node, last);
         let codes = s.load_u(&node.child);
         let nodes = entered & s.mask_bits(s.lt_u(codes, s.splat_u(INSTANCE)));

@@ -14,6 +14,8 @@
 //! An object in world space that is alone needs no top level; where f32 does not hold it or its
 //! rays, they go through it as lines ([`in_place`]).
 //!
+//! Of what does not move, a file may hold the trees ([`trees`], [`stored`]).
+//!
 //! Rows of groups ([`groups`]) lead into trees of the groups. Rays through them go one by one
 //! ([`group_walk`]).
 //!
@@ -41,10 +43,12 @@ mod placement;
 mod refit;
 mod scene_batch;
 mod scene_query;
+mod stored;
 #[cfg(test)]
 mod test_worlds;
 mod top_level;
 mod top_nodes;
+mod trees;
 mod unplaced;
 mod visit_queue;
 mod world;
@@ -60,5 +64,6 @@ pub(crate) use scene_batch::WorldRays;
 pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
+pub use trees::Trees;
 pub(crate) use unplaced::UnplacedRay;
 pub(crate) use world::{InstanceRow, NewInstance, World};

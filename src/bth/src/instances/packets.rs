@@ -181,11 +181,11 @@ impl TopLevelPackets {
         let frustum = FrustumOf::<S, false> { bounds, span: &span, groups }.inline_or_share(s);
         let all = u64::MAX >> (PACKET - rays.len());
         let begin = self.items.len();
-        let mut stack = [0; MAX_STACKED_NODES];
+        let (nodes, mut stack) = (top.nodes(), [0; MAX_STACKED_NODES]);
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let node = top.node(stack[count]);
+            let node = nodes.node(stack[count]);
             let (mut bits, depth) = frustum.children(s, node, f32::INFINITY);
             let mut depths = [0.0; WIDTH];
             s.store(depth, &mut depths);

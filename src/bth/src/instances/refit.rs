@@ -4,7 +4,7 @@
 
 use super::placement::Placement;
 use super::top_level::TopLevel;
-use super::top_nodes::{INSTANCE, InstanceBounds, node_mut, put_bounds, used};
+use super::top_nodes::{INSTANCE, InstanceBounds, TreeLines, node_mut, put_bounds, used};
 use crate::parallel::Tasks;
 use bth_format::layout::{CacheLine, NODE_LINES, WIDTH, WideNode};
 use glam::Vec4;
@@ -17,7 +17,7 @@ impl TopLevel {
     /// which the BVH was built.
     pub(crate) fn refit(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
         self.measure(placements, rows);
-        let mut lines = std::mem::take(&mut self.lines);
+        let TreeLines::Own(mut lines) = std::mem::take(&mut self.lines) else { return };
         TASKS.for_each(&mut lines, |_, lines| self.refit_instances(lines, placements));
         // Children come behind their parents, so that their boxes are final when the parent is
         // reached.
@@ -33,8 +33,8 @@ impl TopLevel {
                 }
             }
         }
-        self.lines = lines;
-        self.cost.update(&self.lines);
+        self.cost.update(&lines);
+        self.lines = TreeLines::Own(lines);
     }
 
     /// Stores the boxes of the instances in some nodes.
@@ -44,7 +44,7 @@ impl TopLevel {
             for slot in 0..used(node) {
                 let code = node.child[slot];
                 if code & INSTANCE != 0
-                    && let Some(placement) = &placements[(code & !INSTANCE) as usize]
+                    && let Some(placement) = &placements[((code & !INSTANCE) - self.first_row) as usize]
                 {
                     put_bounds(node, slot, &self.bounds_of(placement));
                 }

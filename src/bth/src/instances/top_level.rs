@@ -5,8 +5,9 @@
 //! nodes with two or three children, whose empty slots cost memory and time.
 
 use super::placement::Placement;
-use super::top_nodes::{CostRatio, INSTANCE, InstanceBounds, node, node_mut, put_bounds};
-use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
+use super::top_nodes::{CostRatio, INSTANCE, InstanceBounds, TopNodes, TreeLines, node_mut, put_bounds};
+use bth_format::file::File;
+use bth_format::layout::{CacheLine, NODE_LINES, NONE, Tree, WIDTH, WideNode, kind};
 use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectBounds;
 use glam::Vec4;
@@ -22,7 +23,7 @@ pub(crate) struct TopLevel {
     /// The nodes, the root first and parents before their children, aligned to cache lines like the
     /// nodes of objects. The child code of a node is the index of its first line. The child code of
     /// an instance is [`INSTANCE`] and its index.
-    pub(super) lines: Vec<CacheLine>,
+    pub(super) lines: TreeLines,
     /// Max |coordinate| of the instances' boxes.
     pub(crate) extent: f32,
     /// For rays whose origin has a |coordinate| greater than this, the boxes are widened by
@@ -36,6 +37,8 @@ pub(crate) struct TopLevel {
     /// Number of levels of nodes.
     pub(crate) depth: u32,
     pub(super) cost: CostRatio,
+    /// The row of the first placement: the rows before are in trees of the file.
+    pub(super) first_row: u32,
 }
 
 /// From this level on, ranges are halved by their number of instances: instances whose distances
@@ -127,22 +130,44 @@ impl TopLevel {
     pub(crate) fn build(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
         // There is rarely more than one node for every seven instances.
         let count = rows.map_or(placements.len(), <[u32]>::len);
-        self.lines.clear();
-        self.lines.reserve_exact((count / 7 + 1) * NODE_LINES);
+        let mut lines = match std::mem::take(&mut self.lines) {
+            TreeLines::Own(lines) => lines,
+            TreeLines::Stored(..) => Vec::new(),
+        };
+        lines.clear();
+        lines.reserve_exact((count / 7 + 1) * NODE_LINES);
         self.depth = 0;
         self.measure(placements, rows);
         let mut items = Vec::with_capacity(count);
-        for_each_visible(placements, rows, |instance, placement| {
+        for_each_visible(placements, (rows, self.first_row), |instance, placement| {
             items.push(BuildItem::new(self.bounds_of(placement), instance));
         });
-        self.build_from(&mut items);
-        self.cost = CostRatio::of_new(&self.lines);
+        self.build_from(&mut lines, &mut items);
+        self.cost = CostRatio::of_new(&lines);
+        self.lines = TreeLines::Own(lines);
+    }
+
+    /// A tree that a file holds.
+    pub(super) fn stored(file: &File, tree: &Tree) -> TopLevel {
+        let section = file.section(NONE, kind::TREE_LINES).map_or(0..0, |section| {
+            let first = section.entry.offset as usize + tree.first_line as usize * size_of::<CacheLine>();
+            first..first + tree.lines as usize * size_of::<CacheLine>()
+        });
+        let mut top = TopLevel {
+            lines: TreeLines::Stored(file.clone(), section),
+            extent: tree.extent,
+            origin_slack: tree.origin_slack,
+            depth: tree.depth,
+            ..TopLevel::default()
+        };
+        top.set_reach();
+        top
     }
 
     /// Sets what rays need to know about all boxes.
     pub(super) fn measure(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
         let (mut extent, mut origin_slack) = (0.0f32, 0.0f32);
-        for_each_visible(placements, rows, |_, placement| {
+        for_each_visible(placements, (rows, self.first_row), |_, placement| {
             origin_slack = origin_slack.max(placement.origin_slack());
             for k in 0..3 {
                 let greater = placement.upper[k].abs().max(placement.lower[k].abs());
@@ -150,6 +175,11 @@ impl TopLevel {
             }
         });
         (self.extent, self.origin_slack) = (extent, origin_slack);
+        self.set_reach();
+    }
+
+    /// Sets what follows from the extent and the slack.
+    fn set_reach(&mut self) {
         self.reach = REACH * self.extent;
         self.cube = ObjectBounds::around(self.greatest_coordinate());
     }
@@ -165,21 +195,21 @@ impl TopLevel {
         InstanceBounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
     }
 
-    fn build_from(&mut self, items: &mut [BuildItem]) {
+    fn build_from(&mut self, lines: &mut Vec<CacheLine>, items: &mut [BuildItem]) {
         if items.is_empty() {
             return;
         }
         let range = ItemRange::of(0, items);
         #[cfg(feature = "rayon")]
         if items.len() >= MIN_PARALLEL {
-            return self.build_in_parallel(items, range);
+            return self.build_in_parallel(lines, items, range);
         }
-        self.depth = build_subtree(&mut self.lines, items, range, 1);
+        self.depth = build_subtree(lines, items, range, 1);
     }
 
     /// Builds the root, and the subtrees of its children in parallel.
     #[cfg(feature = "rayon")]
-    fn build_in_parallel(&mut self, items: &mut [BuildItem], range: ItemRange) {
+    fn build_in_parallel(&mut self, all: &mut Vec<CacheLine>, items: &mut [BuildItem], range: ItemRange) {
         use rayon::iter::{IntoParallelIterator, ParallelIterator};
         let mut ranges = [range; WIDTH];
         let count = split_into(items, &mut ranges, false);
@@ -201,13 +231,13 @@ impl TopLevel {
                 (slot, lines, depth)
             })
             .collect();
-        let root = add_node(&mut self.lines);
+        let root = add_node(all);
         for (slot, lines, depth) in subtrees {
-            let first = self.lines.len() as u32;
-            put(&mut self.lines, root, slot, first, &ranges[slot].bounds);
+            let first = all.len() as u32;
+            put(all, root, slot, first, &ranges[slot].bounds);
             self.depth = self.depth.max(depth);
-            self.lines.extend_from_slice(&lines);
-            for lines in self.lines[first as usize..].chunks_exact_mut(NODE_LINES) {
+            all.extend_from_slice(&lines);
+            for lines in all[first as usize..].chunks_exact_mut(NODE_LINES) {
                 for code in node_mut(lines).child.iter_mut().filter(|code| **code & INSTANCE == 0) {
                     *code += first;
                 }
@@ -215,10 +245,10 @@ impl TopLevel {
         }
     }
 
-    /// The node with a child code.
+    /// The nodes.
     #[inline(always)]
-    pub(crate) fn node(&self, code: u32) -> &WideNode {
-        node(&self.lines[code as usize..][..NODE_LINES])
+    pub(crate) fn nodes(&self) -> TopNodes<'_> {
+        self.lines.nodes()
     }
 
     /// Returns true if no instance is visible.
@@ -233,14 +263,18 @@ impl TopLevel {
 
     /// Bytes on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        self.lines.capacity() * size_of::<CacheLine>()
+        match &self.lines {
+            TreeLines::Own(lines) => lines.capacity() * size_of::<CacheLine>(),
+            TreeLines::Stored(..) => 0,
+        }
     }
 }
 
-/// Calls `visit` with the visible instances, or with the visible ones of some rows.
+/// Calls `visit` with the visible instances, or with the visible ones of some rows. The placements
+/// begin with that of row `first`.
 fn for_each_visible(
     placements: &[Option<Placement>],
-    rows: Option<&[u32]>,
+    (rows, first): (Option<&[u32]>, u32),
     mut visit: impl FnMut(u32, &Placement),
 ) {
     match rows {
@@ -249,7 +283,7 @@ fn for_each_visible(
             placements.for_each(|(i, placement)| placement.iter().for_each(|p| visit(i as u32, p)));
         }
         Some(rows) => {
-            rows.iter().for_each(|&i| placements[i as usize].iter().for_each(|p| visit(i, p)));
+            rows.iter().for_each(|&i| placements[(i - first) as usize].iter().for_each(|p| visit(i, p)));
         }
     }
 }

@@ -1,8 +1,10 @@
 //! The nodes of the top-level BVH: boxes, child codes, and what rays through them are expected to
 //! cost.
 
+use bth_format::file::File;
 use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
 use glam::Vec4;
+use std::ops::Range;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Bit of the child codes of instances; the other bits are the index of the instance.
@@ -25,6 +27,52 @@ impl InstanceBounds {
         let (lower, upper) = (self.lower.to_array(), self.upper.to_array());
         let [x, y, z] = [0, 1, 2].map(|k| f64::from(upper[k]) + f64::from(lower[k]));
         x * y + y * z + z * x
+    }
+}
+
+/// The lines of the nodes of a top level.
+#[derive(Debug)]
+pub(super) enum TreeLines {
+    Own(Vec<CacheLine>),
+    /// The bytes of a file from and to these.
+    Stored(File, Range<usize>),
+}
+
+impl TreeLines {
+    pub(super) fn nodes(&self) -> TopNodes<'_> {
+        TopNodes(match self {
+            TreeLines::Own(lines) => lines,
+            TreeLines::Stored(file, bytes) => {
+                let bytes = file.bytes().get(bytes.clone()).unwrap_or_default();
+                <[CacheLine]>::ref_from_bytes(bytes).ok().unwrap_or_default()
+            }
+        })
+    }
+
+    /// Returns true if there are no nodes.
+    pub(super) fn is_empty(&self) -> bool {
+        match self {
+            TreeLines::Own(lines) => lines.is_empty(),
+            TreeLines::Stored(_, bytes) => bytes.is_empty(),
+        }
+    }
+}
+
+impl Default for TreeLines {
+    fn default() -> TreeLines {
+        TreeLines::Own(Vec::new())
+    }
+}
+
+/// The nodes of a top level.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TopNodes<'a>(pub(super) &'a [CacheLine]);
+
+impl<'a> TopNodes<'a> {
+    /// The node with a child code.
+    #[inline(always)]
+    pub(crate) fn node(&self, code: u32) -> &'a WideNode {
+        node(&self.0[code as usize..][..NODE_LINES])
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::groups::{Groups, InstancePath};
 use super::placement::{PartBoxes, Placement, PlacementError, Unplaceable};
+use super::stored::StoredRows;
 use super::top_level::TopLevel;
 use crate::animation::Animation;
 use crate::clock;
@@ -14,8 +15,8 @@ use bth_format::SceneView;
 use bth_format::file::File;
 use bth_format::layout::NONE;
 use std::borrow::Cow;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// The top level is built again if its expected cost would exceed this multiple of the cost when it
 /// was built. See `docs/decisions.md`.
@@ -91,8 +92,10 @@ pub(crate) struct World {
     pub(crate) seconds: f64,
     pub(super) source: TransformSource,
     /// For each instance its placement; `None` if it is not visible. With groups for each row, in
-    /// the space of its group.
+    /// the space of its group. Rows in trees of the file come before and have none.
     pub(crate) placements: Vec<Option<Placement>>,
+    /// The rows in trees of the file.
+    pub(super) stored: Option<Arc<StoredRows>>,
     /// The tree over the instances; with groups, over the rows of the world.
     pub(crate) top: TopLevel,
     /// The groups, if there are any.
@@ -100,7 +103,7 @@ pub(crate) struct World {
     /// The only visible instance, if there is exactly one.
     only_visible: Option<u32>,
     /// For each object whether a ray has been traced in it.
-    traced: Vec<AtomicBool>,
+    pub(super) traced: Vec<AtomicBool>,
     /// For each object the boxes from which the world boxes of its instances are computed, once
     /// they were needed.
     parts: Vec<OnceLock<Box<PartBoxes>>>,
@@ -116,6 +119,7 @@ impl World {
             seconds,
             source,
             placements,
+            stored: None,
             top,
             groups: None,
             only_visible,
@@ -224,11 +228,12 @@ impl World {
     /// The first instance that cannot be placed. No instance is changed then.
     pub(crate) fn place_again(&mut self, objects: &Objects, changed: &[u32]) -> Result<Update, Unplaceable> {
         self.forget_parts(changed);
+        self.place_stored(objects)?;
         let mut placed = Vec::new();
         for (instance, placement) in self.placements.iter().enumerate() {
             let instance = instance as u32;
             let Some(object) = placement.as_ref().map(Placement::object) else { continue };
-            let shows_group = self.groups().is_some_and(|groups| groups.shows_group(instance as usize));
+            let shows_group = self.groups().is_some_and(|groups| groups.shows_group(instance));
             if !shows_group && changed.contains(&object) {
                 let to_world = self.row_in_group(objects, instance).to_world;
                 let placement = self.place(objects, object, &to_world, false);
@@ -278,7 +283,7 @@ impl World {
         touched: impl Iterator<Item = u32>,
     ) -> Result<bool, Unplaceable> {
         let Some(groups) = &mut self.groups else { return Ok(true) };
-        touched.for_each(|row| groups.touch(row as usize));
+        touched.for_each(|row| groups.touch(row));
         groups.update(objects, &mut self.placements, MAX_COST_RATIO)
     }
 
@@ -293,7 +298,32 @@ impl World {
 
     /// Number of visible instances.
     pub(super) fn visible(&self) -> usize {
-        self.placements.iter().flatten().count()
+        let stored = self.stored.as_ref().map_or(0, |stored| stored.visible());
+        stored + self.placements.iter().flatten().count()
+    }
+
+    /// Number of rows in trees of the file. They come before the others.
+    pub(super) fn first_row(&self) -> u32 {
+        self.stored.as_ref().map_or(0, |stored| stored.rows())
+    }
+
+    /// Number of rows.
+    pub(crate) fn row_count(&self) -> usize {
+        self.first_row() as usize + self.placements.len()
+    }
+
+    /// The placement of an instance in a tree of the file, in a world without groups.
+    #[inline(never)]
+    pub(super) fn stored_placement(&self, instance: u32) -> Option<&Placement> {
+        self.stored.as_ref()?.placement(instance)
+    }
+
+    /// Returns true if a row is visible, whatever shows its group.
+    fn shows(&self, row: u32) -> bool {
+        match &self.stored {
+            Some(stored) if row < stored.rows() => stored.row(row).visible,
+            _ => self.placements[(row - self.first_row()) as usize].is_some(),
+        }
     }
 
     /// Refits the top level if the same instances are visible and its cost permits, else builds it.
@@ -364,7 +394,7 @@ impl World {
 
     /// Number of instances, visible or not, with groups written out.
     pub(crate) fn instance_count(&self) -> u32 {
-        self.groups().map_or(self.placements.len() as u32, Groups::count)
+        self.groups().map_or(self.row_count() as u32, Groups::count)
     }
 
     /// The rows on the way to an instance.
@@ -376,10 +406,14 @@ impl World {
     /// visible. With groups it has no box.
     pub(crate) fn placed(&self, instance: u32) -> Option<Cow<'_, Placement>> {
         let Some(groups) = self.groups() else {
-            return self.placements.get(instance as usize)?.as_ref().map(Cow::Borrowed);
+            return match &self.stored {
+                Some(stored) if instance >= stored.rows() => None,
+                Some(stored) => stored.placement(instance).map(Cow::Borrowed),
+                None => self.placements.get(instance as usize)?.as_ref().map(Cow::Borrowed),
+            };
         };
         let found = (instance < groups.count()).then(|| groups.find(instance))?;
-        let is_visible = found.path.iter().all(|row| self.placements[*row as usize].is_some());
+        let is_visible = found.path.iter().all(|row| self.shows(*row));
         let (inverse, accuracy) = found.to_world.inverse().filter(|_| is_visible)?;
         Some(Cow::Owned(Placement::without_box(inverse, accuracy, found.object)))
     }
@@ -396,9 +430,16 @@ impl World {
     }
 
     /// World boxes of the visible rows of the world; `None` without groups.
-    pub(crate) fn row_boxes(&self) -> Option<Vec<([f32; 3], [f32; 3])>> {
-        let rows = self.groups()?.world_rows().iter();
-        let placed = rows.filter_map(|row| self.placements[*row as usize].as_ref());
+    pub(crate) fn row_boxes(&self, objects: &Objects) -> Option<Vec<([f32; 3], [f32; 3])>> {
+        let groups = self.groups()?;
+        if let Some(stored) = self.stored.as_ref().filter(|stored| stored.holds_world()) {
+            let tree = stored.trees().last()?;
+            let rows = tree.first_row..tree.first_row + tree.rows;
+            let placed = rows.filter_map(|row| groups.box_of_stored(objects, row));
+            return Some(placed.map(|placement| (placement.lower, placement.upper)).collect());
+        }
+        let rows = groups.world_rows().iter();
+        let placed = rows.filter_map(|row| self.placements[(*row - self.first_row()) as usize].as_ref());
         Some(placed.map(|placement| (placement.lower, placement.upper)).collect())
     }
 
@@ -438,7 +479,8 @@ impl World {
             TransformSource::Caller(caller) => caller.bytes(),
         };
         let parts = self.parts.iter().filter(|parts| parts.get().is_some()).count() * size_of::<PartBoxes>();
-        let groups = self.groups().map_or(0, Groups::bytes);
+        let groups = self.groups().map_or(0, Groups::bytes)
+            + self.stored.as_ref().map_or(0, |stored| stored.bytes());
         let instances =
             groups + size_of_val(self.placements.as_slice()) + size_of_val(self.parts.as_slice()) + parts;
         (instances + self.top.bytes(), source)

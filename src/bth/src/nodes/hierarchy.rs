@@ -21,38 +21,56 @@ const INVISIBLE: u8 = 4;
 pub(crate) struct NodeHierarchy {
     /// Time of the last update; NaN before the first.
     seconds: f64,
-    /// For each node [`MOVED`] and [`HIDDEN`].
+    /// The nodes before this one do not move, and nothing is stored of them.
+    first: u32,
+    /// For each other node [`MOVED`] and [`HIDDEN`].
     state: Vec<u8>,
     /// The nodes with children, ascending. Only their transforms are stored.
     parents: Vec<u32>,
     /// For each node of `parents` its transform to world space.
     to_world: Vec<Affine>,
-    /// For each node the index of its first track, with a further element at the end; empty without
-    /// tracks.
+    /// For each node from the first that moves the index of its first track, with a further element
+    /// at the end; empty without tracks.
     first_track: Vec<u32>,
 }
 
 impl NodeHierarchy {
-    /// The hierarchy of a checked scene, before the first update.
-    pub(crate) fn new(view: &SceneView<'_>) -> NodeHierarchy {
-        let mut is_parent = vec![false; view.nodes.len()];
-        for node in view.nodes.iter().filter(|node| node.parent != NONE) {
-            is_parent[node.parent as usize] = true;
+    /// The hierarchy of a scene, before the first update. Nodes before `first` have no tracks, and
+    /// no parents among the others.
+    pub(crate) fn new(view: &SceneView<'_>, first: u32) -> NodeHierarchy {
+        let nodes = &view.nodes[first as usize..];
+        let mut is_parent = vec![false; nodes.len()];
+        for node in nodes.iter().filter(|node| node.parent != NONE) {
+            is_parent[(node.parent - first) as usize] = true;
         }
         let mut parents = Vec::with_capacity(is_parent.iter().filter(|is_parent| **is_parent).count());
-        parents.extend((0..view.nodes.len() as u32).filter(|node| is_parent[*node as usize]));
+        parents.extend((0..nodes.len() as u32).filter(|i| is_parent[*i as usize]).map(|i| first + i));
         let first_track = if view.tracks.is_empty() {
             Vec::new()
         } else {
-            let first = |node: usize| view.tracks.partition_point(|t| (t.node as usize) < node) as u32;
-            (0..=view.nodes.len()).map(first).collect()
+            let first_of = |node: usize| view.tracks.partition_point(|t| (t.node as usize) < node) as u32;
+            (first as usize..=view.nodes.len()).map(first_of).collect()
         };
         NodeHierarchy {
             seconds: f64::NAN,
-            state: vec![0; view.nodes.len()],
+            first,
+            state: vec![0; nodes.len()],
             to_world: vec![Affine::IDENTITY; parents.len()],
             parents,
             first_track,
+        }
+    }
+
+    /// A hierarchy in which nothing moves.
+    pub(crate) fn at_rest() -> NodeHierarchy {
+        let (seconds, first, state) = (f64::NAN, u32::MAX, Vec::new());
+        NodeHierarchy {
+            seconds,
+            first,
+            state,
+            parents: Vec::new(),
+            to_world: Vec::new(),
+            first_track: Vec::new(),
         }
     }
 
@@ -61,7 +79,8 @@ impl NodeHierarchy {
     pub(crate) fn update(&mut self, view: &SceneView<'_>, seconds: f64, all: bool) -> usize {
         let previous = std::mem::replace(&mut self.seconds, seconds);
         let (mut moved, mut next_parent_row) = (0, 0);
-        for row in 0..view.nodes.len() {
+        let first = self.first as usize;
+        for row in first..view.nodes.len() {
             let is_parent = self.parents.get(next_parent_row) == Some(&(row as u32));
             let parent_row = next_parent_row;
             next_parent_row += usize::from(is_parent);
@@ -69,16 +88,16 @@ impl NodeHierarchy {
             let node = &view.nodes[row];
             let parent_state = match node.parent {
                 NONE => 0,
-                parent => self.state[parent as usize],
+                parent => self.state[parent as usize - first],
             };
             if !(all || changed || parent_state & MOVED != 0) {
-                self.state[row] &= HIDDEN | INVISIBLE;
+                self.state[row - first] &= HIDDEN | INVISIBLE;
                 continue;
             }
             moved += 1;
             let invisible = parent_state & INVISIBLE != 0 || !self.is_visible(view, row as u32);
             let hidden = invisible || parent_state & HIDDEN != 0 || !self.has_size(view, row as u32);
-            self.state[row] = MOVED | if hidden { HIDDEN } else { 0 } | if invisible { INVISIBLE } else { 0 };
+            self.state[row - first] = MOVED | if hidden { HIDDEN } else { 0 } | if invisible { INVISIBLE } else { 0 };
             if is_parent {
                 self.to_world[parent_row] =
                     self.child_to_world(view, node.parent, &self.local(view, row as u32));
@@ -89,18 +108,39 @@ impl NodeHierarchy {
 
     /// Returns true if a node moved, was hidden or became visible in the last update.
     pub(crate) fn moved(&self, node: u32) -> bool {
-        self.state[node as usize] & MOVED != 0
+        self.state[(node - self.first) as usize] & MOVED != 0
     }
 
     /// Returns true if the visibility of a node or of an ancestor hides it, whatever their scales
     /// are.
     pub(crate) fn invisible(&self, node: u32) -> bool {
-        self.state[node as usize] & INVISIBLE != 0
+        self.state[(node - self.first) as usize] & INVISIBLE != 0
     }
 
     /// Returns true if a node or an ancestor is hidden.
     pub(crate) fn hidden(&self, node: u32) -> bool {
-        self.state[node as usize] & HIDDEN != 0
+        self.state[(node - self.first) as usize] & HIDDEN != 0
+    }
+
+    /// Like [`Self::hidden`], of any node.
+    pub(crate) fn hidden_of(&self, view: &SceneView<'_>, mut node: u32) -> bool {
+        if node >= self.first {
+            return self.hidden(node);
+        }
+        loop {
+            if self.hides(view, node) {
+                return true;
+            }
+            match view.nodes[node as usize].parent {
+                NONE => return false,
+                parent => node = parent,
+            }
+        }
+    }
+
+    /// Returns true if a node hides itself and what is below it, whatever is above.
+    fn hides(&self, view: &SceneView<'_>, node: u32) -> bool {
+        !(self.is_visible(view, node) && self.has_size(view, node))
     }
 
     /// The transform from a node's space to world space.
@@ -127,7 +167,8 @@ impl NodeHierarchy {
 
     /// Indices of the tracks of a node.
     fn tracks_of(&self, node: usize) -> std::ops::Range<usize> {
-        match self.first_track.get(node..node + 2) {
+        let at = node.checked_sub(self.first as usize);
+        match at.and_then(|at| self.first_track.get(at..at + 2)) {
             Some(ends) => ends[0] as usize..ends[1] as usize,
             None => 0..0,
         }

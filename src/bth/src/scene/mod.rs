@@ -283,7 +283,7 @@ impl Scene {
     /// Number of rows: instances of objects and groups, in the world and in groups, each once. The
     /// same as [`Self::instance_count`] without groups.
     pub fn row_count(&self) -> u32 {
-        self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
+        self.world().map_or(self.object_count(), |world| world.row_count() as u32)
     }
 
     /// Index of an instance's object; `u32::MAX` if a scene builder has removed the instance.
@@ -342,7 +342,7 @@ impl Scene {
     /// Boxes in world space that contain all that is visible: [`Self::instance_bounds`] of the
     /// visible instances, or with groups boxes of the rows in the world.
     pub fn visible_bounds(&self) -> Vec<Bounds> {
-        match self.world().and_then(World::row_boxes) {
+        match self.world().and_then(|world| world.row_boxes(self.objects())) {
             Some(boxes) => boxes,
             None => (0..self.instance_count()).filter_map(|i| self.instance_bounds(i)).collect(),
         }

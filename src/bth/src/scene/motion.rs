@@ -1,7 +1,7 @@
 //! Motion of a [`Scene`]: instances at its time, and new positions of objects.
 
 use crate::clock;
-use crate::instances::World;
+use crate::instances::{Trees, World};
 use crate::objects::Objects;
 use crate::refit::OwnPositions;
 use crate::scene::Scene;
@@ -25,12 +25,14 @@ pub struct InstanceView {
 }
 
 /// Checks the scene sections of a file, and that every visible instance can be placed at the first
-/// frame. The sections of objects are not checked.
+/// frame. The sections of objects are not checked, and only their `OBJECT` rows have to be there.
+/// Returns the trees that the file may hold.
 ///
 /// # Errors
 /// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as for [`Scene::set_seconds`].
-pub fn check_first_frame(file: &File) -> Result<(), Error> {
-    World::new(&Objects::of_file(file.clone())).map(drop)
+pub fn check_first_frame(file: &File) -> Result<Trees, Error> {
+    let objects = Objects::of_file(file.clone());
+    Ok(World::new(&objects)?.map(|world| world.trees(&objects)).unwrap_or_default())
 }
 
 /// Checks that a time is finite.

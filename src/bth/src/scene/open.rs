@@ -40,7 +40,8 @@ pub fn from_file(file: File) -> Result<Scene, Error> {
 }
 
 /// Maps a compiled file into memory and checks only its header, section table and scene sections,
-/// so the time does not depend on the size of its objects.
+/// so the time does not depend on the size of its objects. Of a scene with stored trees the scene
+/// sections are not checked, either: rows that the trees hold are read when rays come near them.
 ///
 /// # Safety
 /// Until the scene, and every scene that [`SceneBuilder`](crate::SceneBuilder) makes of it, is
@@ -55,7 +56,7 @@ pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
     // SAFETY: the caller's contract includes the contract of `File::map`.
     let file = unsafe { File::map(path)? };
-    with_world(file).map_err(|e| e.in_file(path))
+    with_world(file, World::with_trees).map_err(|e| e.in_file(path))
 }
 
 /// Checks all sections of a file and opens its scene.
@@ -65,15 +66,22 @@ fn checked(file: File) -> Result<Scene, Error> {
     }
     file.check_object_names()?;
     file.check_images()?;
-    with_world(file)
+    with_world(file, |_| Ok(None))
 }
 
-/// Checks only the scene sections of a file and opens its scene.
-fn with_world(file: File) -> Result<Scene, Error> {
+/// Opens the scene of a file. Checks only the scene sections, and not them where `stored` returns
+/// instances.
+fn with_world(
+    file: File,
+    stored: impl FnOnce(&Objects) -> Result<Option<World>, Error>,
+) -> Result<Scene, Error> {
     let has = |section: u32| file.table().iter().any(|e| e.kind == section && e.count != 0);
     let (has_opacity, has_tetrahedra) = (has(kind::OPACITY), has(kind::TET_LEAVES));
     let mut objects = Objects::of_file(file);
-    let mut world = World::new(&objects)?;
+    let mut world = match stored(&objects)? {
+        Some(world) => Some(world),
+        None => World::new(&objects)?,
+    };
     match &mut world {
         Some(world) => world.deform_first(&mut objects)?,
         // Objects with positions in f64 are traced as instances.

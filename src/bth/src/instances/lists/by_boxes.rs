@@ -63,11 +63,11 @@ impl<S: Simd> BoxTests<S> {
             code: s.splat_u(0),
             is_worthwhile: false,
         };
-        let (mut stack, mut height) = ([0; MAX_TESTS], 1);
+        let (nodes, mut stack, mut height) = (top.nodes(), [0; MAX_TESTS], 1);
         let (mut tests, mut rows, mut reached) = (0, 0, count);
         while height > 0 {
             height -= 1;
-            let node = top.node(stack[height % MAX_TESTS]);
+            let node = nodes.node(stack[height % MAX_TESTS]);
             let mut slots = s.mask_bits(s.lt_u(s.load_u(&node.child), s.splat_u(BOTTOM)));
             tests += slots.count_ones() as usize;
             if tests > MAX_TESTS {

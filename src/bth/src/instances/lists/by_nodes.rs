@@ -108,14 +108,14 @@ impl NodeTests {
     pub(super) fn run<S: Simd>(&mut self, s: S, top: &TopLevel, rays: &[RayToList<'_>]) -> u32 {
         let NodeTests { nodes, lanes, lists, counts } = self;
         *counts = [0; LANES];
-        let (mut next, mut end) = (0, rays.len());
+        let (tree, mut next, mut end) = (top.nodes(), 0, rays.len());
         for (lane, to) in lanes[..end].iter_mut().enumerate() {
             (*to, nodes[lane]) = (lane as u8, 0);
         }
         let mut failed = 0;
         while next < end {
             let lane = usize::from(lanes[next]) % LANES;
-            let node = top.node(nodes[next]);
+            let node = tree.node(nodes[next]);
             next += 1;
             let ray = &rays[lane];
             let (bits, depth) = ray.slabs.children(s, node, ray.last);
@@ -147,12 +147,12 @@ impl NodeTests {
     #[inline(always)]
     pub(super) fn run_one<S: Simd>(&mut self, s: S, top: &TopLevel, ray: &RayToList<'_>, lane: usize) -> f32 {
         let planes = RaySlabLanes::new(s, ray.slabs);
-        let (mut stack, mut code) = (SingleStack::new(), 0);
+        let (nodes, mut stack, mut code) = (top.nodes(), SingleStack::new(), 0);
         let mut stack = stack.start(code);
         let (mut count, mut last, mut missing) = (0, ray.last, f32::INFINITY);
         // The bottom of the stack is no node.
         while code & INSTANCE == 0 {
-            let node = top.node(code);
+            let node = nodes.node(code);
             let (met, depth) = entered(s, &planes, node, last);
             let child = s.load_u(&node.child);
             let inner = met & s.mask_bits(s.lt_u(child, s.splat_u(INSTANCE)));

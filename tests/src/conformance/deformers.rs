@@ -46,8 +46,9 @@ fn scene_parts() -> SceneParts {
     let node = parts.nodes[0];
     parts.nodes = vec![node, Node { parent: 0, ..node }, Node { flags: NODE_MATRIX, ..node }];
     parts.nodes[2].transform = [1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    parts.instances =
-        [(1, 0, 0), (2, 1, 1)].map(|(node, object, first)| Instance { node, object, flags: 0, first }).to_vec();
+    parts.instances = [(1, 0, 0), (2, 1, 1)]
+        .map(|(node, object, first)| Instance { node, object, flags: 0, first })
+        .to_vec();
     let track = |node, property: Property, interpolation: Interpolation, first: [u32; 2]| Track {
         node,
         property: property as u32,

@@ -32,10 +32,7 @@ pub(super) fn valid() -> Vec<Case> {
     let moving = SceneParts { nodes: still().nodes, ..groups() };
     let track = Track { node: 3, ..moving.tracks[0] };
     let moving = SceneParts { tracks: vec![track], ..moving };
-    vec![
-        Case::new("scene-trees", file(&still(), 3)),
-        Case::new("scene-trees-of-groups", file(&moving, 2)),
-    ]
+    vec![Case::new("scene-trees", file(&still(), 3)), Case::new("scene-trees-of-groups", file(&moving, 2))]
 }
 
 pub(super) fn invalid() -> Vec<Case> {

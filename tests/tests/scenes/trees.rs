@@ -34,7 +34,9 @@ const OBJECTS: &str =
 fn grouped(count: u32) -> String {
     let mut text = format!("{OBJECTS}[[nodes]]\nname = \"patch\"\n[[nodes]]\nname = \"field\"\n");
     text += &nodes(count, "parent = \"patch\"");
-    for (row, (name, more, shown)) in [("p", "parent = \"field\"\n", "patch"), ("f", "", "field")].iter().enumerate() {
+    for (row, (name, more, shown)) in
+        [("p", "parent = \"field\"\n", "patch"), ("f", "", "field")].iter().enumerate()
+    {
         for i in 0..4 {
             let (x, y) = (i * 120 * (1 + 3 * row), 50 * i);
             let _ = write!(
@@ -50,8 +52,8 @@ fn grouped(count: u32) -> String {
 /// A scene of a compiled file as it is mapped, and as it is read.
 fn opened(text: &str, options: &CompileOptions) -> (bth::Scene, bth::Scene, tempfile::TempDir) {
     let folder = models();
-    let (bytes, _) =
-        scene::compile(&manifest(text), folder.path(), Path::new("x"), options, &Silent).expect("it compiles");
+    let (bytes, _) = scene::compile(&manifest(text), folder.path(), Path::new("x"), options, &Silent)
+        .expect("it compiles");
     let path = folder.path().join("scene.bth");
     std::fs::write(&path, &bytes.bytes).unwrap();
     let read = bth::from_bytes(&bytes.bytes).unwrap();

@@ -222,7 +222,12 @@ fn build(
         let Trees { trees, lines } = check(&objects, parts, &builder, name)?;
         if lines.len() >= MIN_TREE_LINES {
             builder.section(kind::TREES, NONE, size_of::<Tree>() as u32, trees.as_bytes().to_vec())?;
-            builder.section(kind::TREE_LINES, NONE, size_of::<CacheLine>() as u32, lines.as_bytes().to_vec())?;
+            builder.section(
+                kind::TREE_LINES,
+                NONE,
+                size_of::<CacheLine>() as u32,
+                lines.as_bytes().to_vec(),
+            )?;
             builder.move_large(&mut to_disk)?;
         }
         builder.check_limits()?;
@@ -282,12 +287,7 @@ fn report(
 /// Checks the first frame as a reader does. The sections of the objects have been checked one by
 /// one before, so the check reads a file with their OBJECT rows only; the whole file where objects
 /// deform. Returns the trees that the file may hold.
-fn check(
-    objects: &Objects,
-    parts: SceneParts,
-    builder: &FileBuilder<'static>,
-    name: &Path,
-) -> Result<Trees> {
+fn check(objects: &Objects, parts: SceneParts, builder: &FileBuilder<'static>, name: &Path) -> Result<Trees> {
     let whole = || Content::from(builder.clone());
     if !parts.deformers.deformers.is_empty() {
         let opened = bth::from_bytes(&whole().bytes()?).map(drop);

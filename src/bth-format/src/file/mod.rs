@@ -146,7 +146,8 @@ impl File {
         let objects = table::check(buffer.bytes(), buffer.bytes().len() as u64)?;
         let views = (0..objects).map(|_| OnceLock::new()).collect();
         let (header, _) = Header::ref_from_prefix(buffer.bytes()).ok().expect("checked above");
-        let of_objects = table::entries(buffer.bytes(), header).iter().take_while(|entry| entry.object != NONE);
+        let of_objects =
+            table::entries(buffer.bytes(), header).iter().take_while(|entry| entry.object != NONE);
         let (mut rows, mut end) = (Vec::with_capacity(objects as usize + 1), 0);
         for entry in of_objects {
             if entry.kind == kind::OBJECT {

@@ -164,11 +164,12 @@ pub(super) fn check(bytes: &[u8], length: u64) -> Result<u32> {
     for (i, e) in entries.iter().enumerate() {
         let previous = i.checked_sub(1).map(|p| &entries[p]);
         let end = if e.kind == kind::OBJECT { &mut first_end } else { &mut end };
-        *end =
-            check_entry(e, previous, *end, header.file_length).map_err(|(code, field, expected, found)| {
+        *end = check_entry(e, previous, *end, header.file_length).map_err(
+            |(code, field, expected, found)| {
                 let at = HEADER_SIZE as u64 + i as u64 * ENTRY_SIZE + field as u64;
                 Error::within(code, e.kind, at, expected, found).in_object(e.object)
-            })?;
+            },
+        )?;
     }
     let objects = check_objects(entries)?;
     let id = content_id(entries);

@@ -64,7 +64,8 @@ pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
     }
     errors.extend(file.check_object_names().err());
     errors.extend(file.check_images().err());
-    errors.extend(file.check_scene().and_then(|_| trees::check(file).map_err(|e| file.locate(e, NONE))).err());
+    errors
+        .extend(file.check_scene().and_then(|_| trees::check(file).map_err(|e| file.locate(e, NONE))).err());
     if errors.is_empty() { Ok(report) } else { Err(errors) }
 }
 

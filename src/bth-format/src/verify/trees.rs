@@ -81,15 +81,17 @@ impl Check<'_> {
             counts[self.group_of(instance.node)] += 1;
             counts
         });
-        let written_out = self.groups.as_ref().and_then(|groups| groups.written_out(instances, |_, _| {}).ok());
+        let written_out =
+            self.groups.as_ref().and_then(|groups| groups.written_out(instances, |_, _| {}).ok());
         let (mut row, mut node, mut line) = (0u64, 0usize, 0u64);
         for (number, tree) in trees.iter().enumerate() {
-            let behind = nodes[node..].iter().zip(node as u32..).take_while(|(_, n)| self.group_of(*n) == number);
+            let behind =
+                nodes[node..].iter().zip(node as u32..).take_while(|(_, n)| self.group_of(*n) == number);
             node += behind.count();
             let count = counts.get(number).copied();
-            let all = written_out.as_ref().map_or(Some(instances.len() as u32), |all| {
-                all.get(number).map(|group| group.instances)
-            });
+            let all = written_out
+                .as_ref()
+                .map_or(Some(instances.len() as u32), |all| all.get(number).map(|group| group.instances));
             let is_right = u64::from(tree.first_row) == row
                 && Some(tree.rows) == count
                 && Some(tree.instances) == all
@@ -107,14 +109,18 @@ impl Check<'_> {
             || trees.len() == self.world() + 1
             || trees.len() == self.world() && (row as usize) < instances.len();
         if !is_whole || line != tree_lines.len() as u64 {
-            return wrong(0, "a tree for each group, and lines of these trees", format!("{} trees", trees.len()));
+            return wrong(
+                0,
+                "a tree for each group, and lines of these trees",
+                format!("{} trees", trees.len()),
+            );
         }
         let moves = tracks.iter().any(|track| (track.node as usize) < node)
             || !deformers.is_empty()
             || (0..self.file.object_count()).any(|object| {
-                [kind::SEQUENCE_TIMES, kind::EXACT_POSITIONS]
-                    .into_iter()
-                    .any(|kind| self.file.section(object, kind).is_some_and(|section| section.entry.count > 0))
+                [kind::SEQUENCE_TIMES, kind::EXACT_POSITIONS].into_iter().any(|kind| {
+                    self.file.section(object, kind).is_some_and(|section| section.entry.count > 0)
+                })
             });
         if !trees.is_empty() && moves {
             let expected = "trees over what does not move, of objects in f32";
@@ -145,10 +151,15 @@ impl Check<'_> {
             let used = node.child.iter().take_while(|code| **code != NONE).count();
             let is_empty = |slot: usize| {
                 node.child[slot] == NONE
-                    && (0..3).all(|k| (node.bounds[k][0][slot], node.bounds[k][1][slot]) == (f32::MAX, f32::MIN))
+                    && (0..3)
+                        .all(|k| (node.bounds[k][0][slot], node.bounds[k][1][slot]) == (f32::MAX, f32::MIN))
             };
             if used == 0 || !(used..WIDTH).all(is_empty) {
-                return wrong(number, "used slots first, and empty boxes behind", format!("node at line {at}"));
+                return wrong(
+                    number,
+                    "used slots first, and empty boxes behind",
+                    format!("node at line {at}"),
+                );
             }
             for (slot, &child) in node.child[..used].iter().enumerate() {
                 let bounds = [0, 1].map(|end| [0, 1, 2].map(|k| f64::from(node.bounds[k][end][slot])));
@@ -168,7 +179,8 @@ impl Check<'_> {
                 let Some(i) = first.filter(|i| !std::mem::replace(&mut seen[*i as usize], true)) else {
                     return wrong(number, "rows of the group, each once", format!("row {row}"));
                 };
-                let Some(placed) = self.row(number, &self.view.instances[(tree.first_row + i) as usize])? else {
+                let Some(placed) = self.row(number, &self.view.instances[(tree.first_row + i) as usize])?
+                else {
                     return wrong(number, "rows that are visible", format!("row {row}"));
                 };
                 visible += 1;

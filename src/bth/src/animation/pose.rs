@@ -95,7 +95,7 @@ mod tests {
             skin_joints: &[joint; 3],
             ..SceneView::default()
         };
-        let mut hierarchy = NodeHierarchy::new(&view);
+        let mut hierarchy = NodeHierarchy::new(&view, 0);
         hierarchy.update(&view, 0.0, true);
         let mut matrices = SkinMatrices::new(&view, &hierarchy);
         let mut joints = |object, skin| Pose::of(&mut matrices, &deformer(object, skin), 0.0).joints;

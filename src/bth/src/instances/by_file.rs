@@ -50,7 +50,7 @@ impl World {
         world.stored = Some(Arc::clone(&stored));
         if stored.groups() > 0 {
             let within = stored.groups();
-            let place = |instance: &Instance| RowPlace { object: stored.shown(instance), within };
+            let place = |instance: &Instance| RowPlace { object: stored.shown(&view, instance), within };
             let groups = groups::Groups::of_file(&stored, rows.iter().map(place));
             world.set_groups(groups.expect("a file whose scene has been checked"));
         }

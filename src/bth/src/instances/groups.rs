@@ -270,14 +270,6 @@ impl Groups {
         }
     }
 
-    /// The number of the first instance of a row among those of its group.
-    fn first_of(&self, row: u32) -> u32 {
-        match &self.stored {
-            Some(stored) if row < stored.rows() => stored.first(row),
-            _ => self.row(row).first,
-        }
-    }
-
     /// Number of instances once groups are written out.
     pub(super) fn count(&self) -> u32 {
         self.groups.last().map_or(0, |world| world.count)
@@ -344,13 +336,19 @@ impl Groups {
     /// Finds an instance by its number, which is below [`Self::count`].
     pub(super) fn find(&self, instance: u32) -> FoundInstance {
         let (mut level, mut path) = (self.world(), InstancePath::default());
+        let stored = self.stored.as_ref().map_or(&[][..], |stored| stored.instances());
+        let in_trees = self.first_row();
+        let first_of = |row: u32| match row < in_trees {
+            true => stored[row as usize].first,
+            false => self.rows[(row - in_trees) as usize].first,
+        };
         loop {
             let group = self.group(&level);
             // Of rows with the same number all but the last show empty groups.
             let (mut first, mut end) = (0, group.len());
             while end - first > 1 {
                 let middle = first + (end - first) / 2;
-                match level.first + self.first_of(group.row(middle)) <= instance {
+                match level.first + first_of(group.row(middle)) <= instance {
                     true => first = middle,
                     false => end = middle,
                 }
@@ -425,7 +423,9 @@ impl Groups {
         for row in (0..group.len()).map(|i| group.row(i)) {
             let accuracy = match row.checked_sub(first_row) {
                 Some(at) => placements[at as usize].as_ref().map(|placement| placement.accuracy),
-                None => Some(self.row(row)).filter(|row| row.visible).and_then(|row| Some(row.to_outer.inverse()?.1)),
+                None => Some(self.row(row))
+                    .filter(|row| row.visible)
+                    .and_then(|row| Some(row.to_outer.inverse()?.1)),
             };
             let Some(accuracy) = accuracy else { continue };
             let shown = group_in(self.row(row).object);

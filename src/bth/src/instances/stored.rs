@@ -23,6 +23,10 @@ pub(crate) struct StoredRows {
     /// Number of rows, and of the nodes of their groups: the first ones of NODES.
     rows: u32,
     nodes: u32,
+    /// Number of groups; the world has this number.
+    groups: u32,
+    /// True if the world does not move, either.
+    holds_world: bool,
     /// The rows of groups.
     of_groups: LazyRows<GroupRow>,
     /// The placements of a world without groups.
@@ -34,13 +38,18 @@ impl StoredRows {
     pub(super) fn of(file: &File) -> Option<StoredRows> {
         let view = file.scene()?;
         let last = view.trees.last()?;
-        let rows = last.first_row.checked_add(last.rows).filter(|rows| *rows as usize <= view.instances.len())?;
-        let has_groups = view.trees.len() > 1 || (rows as usize) < view.instances.len();
+        let rows =
+            last.first_row.checked_add(last.rows).filter(|rows| *rows as usize <= view.instances.len())?;
+        let holds_world = rows as usize == view.instances.len();
+        let groups = (view.trees.len() - usize::from(holds_world)) as u32;
+        let has_groups = groups > 0;
         Some(StoredRows {
             file: file.clone(),
             hierarchy: NodeHierarchy::at_rest(),
             rows,
             nodes: last.end_node.min(view.nodes.len() as u32),
+            groups,
+            holds_world,
             of_groups: LazyRows::new(if has_groups { rows } else { 0 }),
             placements: LazyRows::new(if has_groups { 0 } else { rows }),
         })
@@ -72,28 +81,22 @@ impl StoredRows {
 
     /// Number of groups; the world has this number.
     pub(super) fn groups(&self) -> u32 {
-        (self.trees().len() - usize::from(self.holds_world())) as u32
+        self.groups
     }
 
     /// Returns true if the world does not move, either.
     pub(super) fn holds_world(&self) -> bool {
-        self.rows as usize == self.view().instances.len()
+        self.holds_world
     }
 
-    /// The number of the group in which a node is.
-    pub(super) fn group_of(&self, node: u32) -> u32 {
-        let group = self.trees().partition_point(|tree| tree.end_node <= node) as u32;
-        group.min(self.groups())
+    /// The rows of the file.
+    pub(super) fn instances(&self) -> &[Instance] {
+        self.file.instances()
     }
 
     /// Number of visible rows.
     pub(super) fn visible(&self) -> usize {
         self.trees().iter().map(|tree| tree.visible as usize).sum()
-    }
-
-    /// The number of the first instance of a row among those of its group.
-    pub(super) fn first(&self, row: u32) -> u32 {
-        self.view().instances[row as usize].first
     }
 
     /// A row of a group.
@@ -102,7 +105,12 @@ impl StoredRows {
             let view = self.view();
             rows.map(move |row| {
                 let of = &view.instances[row as usize];
-                GroupRow::stored(self.to_outer(&view, of), self.shown(of), of.first, self.is_visible(&view, of))
+                GroupRow::stored(
+                    self.to_outer(&view, of),
+                    self.shown(&view, of),
+                    of.first,
+                    self.is_visible(&view, of),
+                )
             })
         })
     }
@@ -122,8 +130,9 @@ impl StoredRows {
     }
 
     /// What a row shows, as [`GroupRow`] has it.
-    pub(super) fn shown(&self, of: &Instance) -> u32 {
-        of.group().map_or(of.object, |node| super::object_of_group(self.group_of(node)))
+    pub(super) fn shown(&self, view: &SceneView<'_>, of: &Instance) -> u32 {
+        let group_of = |node: u32| view.trees.partition_point(|tree| tree.end_node <= node) as u32;
+        of.group().map_or(of.object, |node| super::object_of_group(group_of(node).min(self.groups)))
     }
 
     fn to_outer(&self, view: &SceneView<'_>, of: &Instance) -> Affine {

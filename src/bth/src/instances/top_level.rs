@@ -394,6 +394,7 @@ const EMPTY: WideNode =
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instances::top_nodes::node;
 
     #[test]
     fn subtrees_on_deep_levels_are_halved_and_stay_within_the_depth_of_stacks() {

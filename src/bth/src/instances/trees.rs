@@ -54,7 +54,8 @@ impl World {
             return trees;
         }
         let mut end_node = 0;
-        let placed = |rows: &[u32]| rows.iter().filter(|row| self.placements[**row as usize].is_some()).count();
+        let placed =
+            |rows: &[u32]| rows.iter().filter(|row| self.placements[**row as usize].is_some()).count();
         for (number, group) in (0..count).zip(self.groups().into_iter().flat_map(|groups| groups.each())) {
             while end_node < nodes && group_of(end_node) == number {
                 end_node += 1;

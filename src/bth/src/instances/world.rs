@@ -479,8 +479,8 @@ impl World {
             TransformSource::Caller(caller) => caller.bytes(),
         };
         let parts = self.parts.iter().filter(|parts| parts.get().is_some()).count() * size_of::<PartBoxes>();
-        let groups = self.groups().map_or(0, Groups::bytes)
-            + self.stored.as_ref().map_or(0, |stored| stored.bytes());
+        let groups =
+            self.groups().map_or(0, Groups::bytes) + self.stored.as_ref().map_or(0, |stored| stored.bytes());
         let instances =
             groups + size_of_val(self.placements.as_slice()) + size_of_val(self.parts.as_slice()) + parts;
         (instances + self.top.bytes(), source)

@@ -97,7 +97,8 @@ impl NodeHierarchy {
             moved += 1;
             let invisible = parent_state & INVISIBLE != 0 || !self.is_visible(view, row as u32);
             let hidden = invisible || parent_state & HIDDEN != 0 || !self.has_size(view, row as u32);
-            self.state[row - first] = MOVED | if hidden { HIDDEN } else { 0 } | if invisible { INVISIBLE } else { 0 };
+            self.state[row - first] =
+                MOVED | if hidden { HIDDEN } else { 0 } | if invisible { INVISIBLE } else { 0 };
             if is_parent {
                 self.to_world[parent_row] =
                     self.child_to_world(view, node.parent, &self.local(view, row as u32));

@@ -22,7 +22,7 @@ pub(super) fn check(scene: &Scene) {
             seen[(code & !INSTANCE) as usize] += 1;
             continue;
         }
-        let node = world.top.node(code);
+        let node = world.top.nodes().node(code);
         for slot in (0..16).filter(|&slot| node.child[slot] != NONE) {
             let ends = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
             for k in 0..3 {

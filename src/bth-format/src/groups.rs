@@ -56,7 +56,7 @@ impl Groups {
 
     /// What each group and then the world holds, if each group only has instances of groups with a
     /// lower number. Calls `first` with each row of `instances` and the number of its first
-    /// instance among those of its group.
+    /// instance among the instances of its group.
     ///
     /// # Errors
     /// What is found if that exceeds the limits.

@@ -13,7 +13,7 @@ fn still() -> SceneParts {
     SceneParts { tracks: Vec::new(), times: Vec::new(), values: Vec::new(), ..groups() }
 }
 
-/// A file with a scene and the trees of a still one, of which `trees` are left.
+/// A file with a scene and the first `trees` trees of the still one.
 fn file(parts: &SceneParts, trees: usize) -> Vec<u8> {
     let still = still();
     let bytes = builder_of(2, &still).finish();

@@ -22,8 +22,8 @@ use bth_scene::Manifest;
 use std::path::Path;
 use zerocopy::IntoBytes;
 
-/// Lines of trees from which on a file holds them: placing the rows of smaller ones when the file is
-/// opened takes less than a millisecond.
+/// Lines of trees from which on a file holds them: placing the rows of smaller ones when the file
+/// is opened takes less than a millisecond.
 const MIN_TREE_LINES: usize = 200 * NODE_LINES;
 
 /// Compiles a scene; paths of the manifest count from `folder`, `name` names the scene in messages.

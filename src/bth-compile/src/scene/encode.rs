@@ -122,8 +122,8 @@ pub(super) fn encode(
     Ok(parts)
 }
 
-/// Gives each row the number of its first instance. Where there are too many, the check of the scene
-/// says so.
+/// Gives each row the number of its first instance. Where there are too many, the check of the
+/// scene says so.
 fn number_instances(nodes: &[on_disk::Node], instances: &mut [on_disk::Instance]) {
     let view = SceneView { nodes, ..SceneView::default() };
     match Groups::of(&view) {

@@ -41,7 +41,7 @@ impl Reference {
 /// Checks that the blocks of LINES and the tet leaves form one tree that covers both: BTH-F105 to
 /// BTH-F115, BTH-F117, BTH-F118, BTH-F123, BTH-F169 and BTH-F187.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
-    let mut tree = Tree {
+    let mut tree = TreeCheck {
         view,
         claimed: BitSet::new(2 * view.lines.len()),
         referenced: BitSet::new(view.tet_leaves.len()),
@@ -61,7 +61,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     tree.placed.check(view)
 }
 
-struct Tree<'a> {
+struct TreeCheck<'a> {
     view: &'a ObjectView<'a>,
     /// Half lines that belong to a block. Leaves on a grid start at any half line, all other blocks
     /// at a line.
@@ -72,7 +72,7 @@ struct Tree<'a> {
     stack: Vec<Reference>,
 }
 
-impl Tree<'_> {
+impl TreeCheck<'_> {
     /// Checks what a code leads to, and pushes the codes found there.
     fn follow(&mut self, reference: &Reference) -> Result<()> {
         let child = self.child(reference)?;

@@ -60,8 +60,8 @@ pub struct Instance {
     pub object: u32,
     /// [`INSTANCE_OF_GROUP`].
     pub flags: u32,
-    /// Number of its first instance among those of its group, or of the world, once groups are
-    /// written out.
+    /// Number of its first instance among the instances of its group, or of the world, once groups
+    /// are written out.
     pub first: u32,
 }
 

@@ -9,7 +9,7 @@ use crate::limits::{MAX_DEPTH, MAX_STORED_LEVELS};
 use crate::view::SceneView;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Half of what points are off, relative to their coordinates and those of a ray's origin.
+/// Half of what points are off, relative to their coordinates and to a ray's origin.
 const HALF_ROOM: f64 = 1.0 / (1u64 << 22) as f64;
 /// The origins of rays for which boxes have room: how far they are, relative to the extent.
 const REACH: f64 = 4.0;
@@ -97,7 +97,7 @@ impl Check<'_> {
                 && Some(tree.instances) == all
                 && tree.end_node as usize == node
                 && u64::from(tree.first_line) == line
-                && tree.lines as usize % NODE_LINES == 0
+                && (tree.lines as usize).is_multiple_of(NODE_LINES)
                 && tree.reserved == [0; 2];
             if !is_right {
                 return wrong(number, "the ranges and counts of the group", format!("{tree:?}"));

@@ -1,7 +1,8 @@
 //! Instances that the caller of a scene builder places: all changes of a commit at once, or none of
 //! them.
 
-use super::groups::{Groups, RowPlace, is_object};
+use super::group_row::is_object;
+use super::groups::{Groups, RowPlace};
 use super::placement::{PlacementError, Unplaceable};
 use super::world::{CallerInstances, InstanceRow, NewInstance, PlaceResult, TransformSource, World};
 use crate::objects::Objects;

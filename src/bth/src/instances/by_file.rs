@@ -1,6 +1,7 @@
 //! The instances of a file with scene sections at a time.
 
-use super::groups::{self, RowPlace, object_of_group};
+use super::group_row::object_of_group;
+use super::groups::{self, RowPlace};
 use super::placement::{PlacementError, Unplaceable};
 use super::stored::StoredRows;
 use super::top_level::TopLevel;

@@ -6,6 +6,7 @@
 //! product of the transforms on the way to it, from the world inwards, each product rounded to f64.
 //! With it, an instance is what it would be in a scene without groups.
 
+use super::group_row::{GroupRow, group_in};
 use super::placement::{PartBoxes, Placement, PlacementError, Unplaceable};
 use super::stored::StoredRows;
 use super::top_level::TopLevel;
@@ -19,8 +20,6 @@ use std::ops::Range;
 use std::sync::Arc;
 use zerocopy::FromZeros;
 
-/// Bit of the object of a row that shows a group; the other bits are its number.
-const GROUP: u32 = 1 << 30;
 /// Up to this bound of the condition number of a product, it is not computed.
 const SAFE_CONDITION: f64 = (1u64 << 23) as f64;
 /// Max number of products beyond [`SAFE_CONDITION`] that are tried: a small file may have billions.
@@ -28,45 +27,6 @@ const MAX_PRODUCTS: usize = 1 << 22;
 /// 2^-44: bounds the roundings of products of up to sixteen transforms, each at most 2^-50 relative
 /// to the norms of its factors.
 const PRODUCT_ERROR: f64 = 1.0 / (1u64 << 44) as f64;
-
-/// The object of a row that shows a group.
-pub(crate) fn object_of_group(group: u32) -> u32 {
-    GROUP | group
-}
-
-/// Returns true for the object of a row that shows one: neither a group nor nothing.
-pub(super) fn is_object(object: u32) -> bool {
-    object < GROUP
-}
-
-/// The group that a row with this object shows.
-fn group_in(object: u32) -> Option<usize> {
-    (object != NONE && object & GROUP != 0).then_some((object & !GROUP) as usize)
-}
-
-/// A row: an instance of an object or of a group, in the world or in a group.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct GroupRow {
-    /// The transform to the space of the group in which it is.
-    to_outer: Affine,
-    /// The object or the group that it shows; `NONE` for a row that was removed.
-    object: u32,
-    /// The number of its first instance among the instances of its group.
-    first: u32,
-    /// False if it hides what it shows.
-    pub(super) visible: bool,
-    /// True if it has to be placed again.
-    moved: bool,
-    /// True if it was visible when it was placed last.
-    was_visible: bool,
-}
-
-impl GroupRow {
-    /// A row in a tree of the file.
-    pub(super) fn stored(to_outer: Affine, object: u32, first: u32, visible: bool) -> GroupRow {
-        GroupRow { to_outer, object, first, visible, moved: false, was_visible: visible }
-    }
-}
 
 /// A group, or the world.
 #[derive(Debug, Default)]

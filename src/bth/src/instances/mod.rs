@@ -31,6 +31,7 @@ mod enter_object;
 mod enumerate;
 #[cfg(test)]
 pub(crate) mod exact_loop;
+mod group_row;
 mod group_walk;
 mod groups;
 pub(crate) mod in_place;
@@ -53,8 +54,9 @@ mod unplaced;
 mod visit_queue;
 mod world;
 
+pub(crate) use group_row::object_of_group;
 pub use groups::InstancePath;
-pub(crate) use groups::object_of_group;
+
 pub(crate) use lines::RayInInstance;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;

@@ -2,7 +2,7 @@
 //! not. Opening a mapped file reads neither the trees nor the rows. What a ray needs of a row is
 //! computed when the first ray comes to its neighbourhood.
 
-use super::groups::GroupRow;
+use super::group_row::{GroupRow, object_of_group};
 use super::placement::Placement;
 use crate::nodes::affine::Affine;
 use crate::nodes::hierarchy::NodeHierarchy;
@@ -132,7 +132,7 @@ impl StoredRows {
     /// What a row shows, as [`GroupRow`] has it.
     pub(super) fn shown(&self, view: &SceneView<'_>, of: &Instance) -> u32 {
         let group_of = |node: u32| view.trees.partition_point(|tree| tree.end_node <= node) as u32;
-        of.group().map_or(of.object, |node| super::object_of_group(group_of(node).min(self.groups)))
+        of.group().map_or(of.object, |node| object_of_group(group_of(node).min(self.groups)))
     }
 
     fn to_outer(&self, view: &SceneView<'_>, of: &Instance) -> Affine {

@@ -271,7 +271,7 @@ impl TopLevel {
 }
 
 /// Calls `visit` with the visible instances, or with the visible ones of some rows. The placements
-/// begin with that of row `first`.
+/// begin with row `first`.
 fn for_each_visible(
     placements: &[Option<Placement>],
     (rows, first): (Option<&[u32]>, u32),

@@ -24,9 +24,9 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Parts of at most `most` triangles. Their number is a power of 16, which is the number of nodes
-    /// at a level of a wide tree: so joining them adds no level. Each split is at a median of the
-    /// centres, along the axis in which these extend farthest.
+    /// Parts of at most `most` triangles. Their number is a power of 16, which is the number of
+    /// nodes at a level of a wide tree: so joining them adds no level. Each split is at a median of
+    /// the centres, along the axis in which these extend farthest.
     ///
     /// # Errors
     /// The errors of [`build`](super::build()).

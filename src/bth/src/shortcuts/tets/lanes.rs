@@ -286,8 +286,8 @@ impl<S: Simd> Lanes<S> {
     /// [`UNCERTAIN`] in `TET` and is otherwise unchanged.
     ///
     /// `links` are the links of all tetrahedra, four each, by ascending opposite vertex. `one` is 1
-    /// in every lane; a variable, because the compiler replaces the masked addition of a constant by
-    /// slower code.
+    /// in every lane; a variable, because the compiler replaces the masked addition of a constant
+    /// by slower code.
     #[inline(always)]
     pub(super) fn follow_link(&mut self, s: S, one: S::U, step: &Step<S>, links: &[[u32; 2]]) {
         let tet = self.words[word::TET];

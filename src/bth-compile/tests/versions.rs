@@ -14,7 +14,7 @@ use std::path::Path;
 /// stage was changed on purpose, raise the stage's version and note what the test prints.
 const NOTED: &str = "\
 bvh 3 85ced845a2e06b3c60ec6905522a8ae3914e4cb9826bc17089f4ec97abdefd04
-file 6.65536 146cdb2d4ca3c7ef21d3164b85dcddcae55c82d38f90beeebc4479e0d6073bda
+file 7.65536 146cdb2d4ca3c7ef21d3164b85dcddcae55c82d38f90beeebc4479e0d6073bda
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
 mesh 10 f9a832bfbe932ba0eec21e4aeddd484d9703aa6ac684d191644612e7ba299c39
 ";

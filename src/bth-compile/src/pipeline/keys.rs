@@ -24,7 +24,7 @@ use bth_files::Digest;
 use std::path::Path;
 
 /// Version of compiled files.
-const FILE: &str = "6";
+const FILE: &str = "7";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = BuildPoses::VERSION;
 

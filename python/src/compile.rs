@@ -280,10 +280,10 @@ fn refuse_input(output: &Path, inputs: &[PathBuf]) -> PyResult<()> {
 
 /// Returns true if a file is compiled as a scene.
 fn is_scene(path: &Path, flatten: bool) -> bool {
-    has_extension(path, &["manifest", "toml"]) || has_extension(path, &["gltf", "glb"]) && !flatten
+    has_extension(path, &["manifest", "toml"]) || bth_import::is_scene(path) && !flatten
 }
 
-/// Compiles a file as the program does: glTF files and manifests are scenes.
+/// Compiles a file as the program does: glTF and FBX files and manifests are scenes.
 fn compile_file(
     path: &Path,
     flatten: bool,

@@ -156,7 +156,7 @@ impl CompileOptions {
             true => mesh::Unreadable::LeftOut,
             false => mesh::Unreadable::Refused,
         };
-        mesh::Looks { alpha: self.alpha, materials: self.materials, unreadable }
+        mesh::Looks { alpha: self.alpha, materials: self.materials, unreadable, polygons: self.polygons }
     }
 
     /// What is built: a BVH for deformable objects.

@@ -21,8 +21,8 @@ const U: f64 = 1.0 / (1u64 << 24) as f64;
 const TWICE_ROOT_3: f64 = 3.47;
 
 /// The concave polygons of a mesh.
-#[derive(Default)]
-pub(super) struct ConcavePolygons {
+#[derive(Clone, Default)]
+pub(crate) struct ConcavePolygons {
     /// Fans some of whose triangles are turned over, or may be before positions are rounded to f32,
     /// or that have corners whose positions were not known yet.
     suspects: Vec<Fan>,
@@ -74,6 +74,9 @@ impl ConcavePolygons {
         polygons: Polygons,
         monitor: &dyn Monitor,
     ) -> Result<()> {
+        if self.suspects.is_empty() {
+            return Ok(());
+        }
         (self.count, self.left, self.first, self.replaced) = (0, 0, 0, Vec::new());
         for &fan in &self.suspects {
             let face = fan.corners(triangles);
@@ -127,6 +130,15 @@ impl ConcavePolygons {
             fan_of(&mut again, &corners);
             of_fan.copy_from_slice(&again);
         }
+    }
+
+    /// Adds concave polygons that were split before, and whose mesh begins with the triangle
+    /// `first`.
+    pub(super) fn add(&mut self, others: &ConcavePolygons, first: usize) {
+        if self.left == 0 {
+            self.first = first + others.first;
+        }
+        (self.count, self.left) = (self.count + others.count, self.left + others.left);
     }
 
     /// Number of concave polygons, whatever has become of them.

@@ -16,9 +16,7 @@ const USD: &str = "python -m bth usd compiles it (pip install bth-rays[usd]); or
 const UNPACK: &str = "unpack it first";
 
 /// What files of other formats begin with.
-const STARTS: [(&[u8], &str, &str); 13] = [
-    (b"Kaydara FBX Binary", "an FBX file", EXPORT),
-    (b"; FBX", "an FBX file", EXPORT),
+const STARTS: [(&[u8], &str, &str); 11] = [
     (b"BLENDER", "a Blender file", EXPORT),
     (b"PXR-USDC", "a USD file", USD),
     (b"#usda", "a USD file", USD),

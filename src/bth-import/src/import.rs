@@ -81,11 +81,11 @@ pub fn import_gltf_parts_bytes(
     let wanted = wanted.into();
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(name, data, monitor);
-    if !format(&source)?.is_gltf() {
-        let message = "expected a glTF or GLB file, of which single meshes can be named";
+    if !format(&source)?.is_scene() {
+        let message = "expected a glTF, GLB or FBX file, of which single meshes can be named";
         return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));
     }
-    let file = GltfFile::open(&source, Use::Parts)?;
+    let file = GltfFile::open(&source, Use::Parts, wanted.polygons)?;
     let shared = gltf::materials::SharedMaterials::default();
     let one = |part: &GltfPart| {
         let raw = gltf::flatten::read_part(&source, &file, *part, wanted, &shared);
@@ -118,7 +118,7 @@ pub fn import_cutouts_bytes(
 ) -> Result<Cutouts> {
     let looks = looks.into();
     let source = Source::new(name, data, monitor);
-    match format(&source)?.is_gltf() && looks.alpha != AlphaMode::None {
+    match format(&source)?.is_scene() && looks.alpha != AlphaMode::None {
         true => gltf::cutout::flat(&source, looks),
         false => Ok(Cutouts::default()),
     }

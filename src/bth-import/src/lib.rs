@@ -1,5 +1,5 @@
-//! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into
-//! manifests.
+//! Reads models: OBJ, PLY, STL, OFF, glTF, GLB and FBX into welded triangle meshes, and scenes of
+//! glTF and FBX into manifests.
 //!
 //! [`import()`] is the entry point, and [`import_sequence`] and [`import_vertex_cache`] for meshes
 //! whose vertices move. `formats` finds the format, whose reader turns the file into a `raw` mesh
@@ -43,7 +43,7 @@ pub use cutout::{AlphaImage, AlphaMode, CutoutCorner, CutoutMaterial, CutoutTria
 pub use deformation::Deformation;
 pub use error::{Error, Place, Result};
 pub use exact::Exact;
-pub use formats::{extensions, source_files};
+pub use formats::{extensions, is_scene, source_files};
 pub use gltf::GltfPart;
 pub use groups::{Group, Groups};
 pub use import::{

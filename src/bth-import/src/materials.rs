@@ -4,6 +4,7 @@
 use crate::cutout::AlphaMode;
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
+use crate::polygon::Polygons;
 use crate::source::IMAGE;
 use bth_format::file::hash128;
 use bth_format::layout::{GlossParameters, MaterialParameters, NONE, Texture, UV_SET_SECOND};
@@ -77,6 +78,8 @@ pub struct Looks {
     pub materials: bool,
     /// What becomes of images and material libraries that cannot be read.
     pub unreadable: Unreadable,
+    /// How polygons become triangles, by whose numbers holes are told.
+    pub polygons: Polygons,
 }
 
 impl From<AlphaMode> for Looks {

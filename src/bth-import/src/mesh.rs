@@ -4,6 +4,7 @@ use crate::deformation::Deformation;
 use crate::exact::Exact;
 use crate::groups::Groups;
 use crate::materials::{Materials, Unreadable};
+pub use crate::polygon::Polygons;
 use crate::zero_area::is_zero_area;
 use serde::{Deserialize, Serialize};
 
@@ -101,19 +102,6 @@ pub enum Keep {
     Normals,
     /// Normals and texture coordinates.
     All,
-}
-
-/// How polygons of more than three corners become triangles. There are two triangles fewer than
-/// corners either way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Polygons {
-    /// Fans from the first corner, which cover more than the polygon where it is concave.
-    #[default]
-    Fans,
-    /// Fans where these cover nothing twice, and otherwise ears that are clipped one after the
-    /// other, which cover the polygon exactly.
-    Ears,
 }
 
 /// In which numbers to keep positions (`--positions`).

@@ -1,6 +1,20 @@
-//! Fans of polygons and their areas.
+//! How polygons become triangles: fans and their areas.
 
 use glam::DVec3;
+use serde::Serialize;
+
+/// How polygons of more than three corners become triangles. There are two triangles fewer than
+/// corners either way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Polygons {
+    /// Fans from the first corner, which cover more than the polygon where it is concave.
+    #[default]
+    Fans,
+    /// Fans where these cover nothing twice, and otherwise ears that are clipped one after the
+    /// other, which cover the polygon exactly.
+    Ears,
+}
 
 /// The vector of a polygon's area, times two.
 pub(super) fn area_vector<T: Into<f64> + Copy>(corners: &[[T; 3]]) -> DVec3 {

@@ -37,7 +37,11 @@ fn details() -> Result<Vec<(&'static str, String)>, Failure> {
     let target = [std::env::consts::ARCH, std::env::consts::OS, ENVIRONMENT];
     let available: Vec<String> =
         Isa::ALL.iter().filter(|isa| isa.is_available()).map(Isa::to_string).collect();
-    let features = [("meshopt", cfg!(feature = "meshopt")), ("s3", cfg!(feature = "s3"))];
+    let features = [
+        ("fbx", cfg!(feature = "fbx")),
+        ("meshopt", cfg!(feature = "meshopt")),
+        ("s3", cfg!(feature = "s3")),
+    ];
     let features: Vec<&str> = features.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect();
     let tetgen = match worker(&TetOptions::default(), &Silent)? {
         Ok((program, version)) => format!("{version} in {}", program.display()),

@@ -36,7 +36,7 @@ impl Import<'_> {
     /// in which the file is read.
     pub(crate) fn key_of(source: &SourceDigest, path: &Path, part: &str, wanted: Wanted) -> Key {
         let Wanted { attributes, groups, materials, unreadable, polygons, positions, vertices } = wanted;
-        let Looks { alpha, materials: _, unreadable: _ } = source.looks;
+        let Looks { alpha, materials: _, unreadable: _, polygons: _ } = source.looks;
         Key::new(Self::NAME)
             .with("source", source.text())
             .with("format", extension(path))

@@ -11,6 +11,7 @@ mod stl;
 use std::path::{Path, PathBuf};
 
 use crate::error::Result;
+use crate::gltf::fbx;
 use crate::materials::{ImageFile, Looks};
 use crate::mesh::Wanted;
 use crate::raw::Raw;
@@ -19,7 +20,7 @@ use crate::text::without_mark;
 use crate::{foreign, gltf};
 
 /// All formats.
-pub(crate) const FORMATS: [Format; 5] = [GLTF, ply::FORMAT, stl::FORMAT, off::FORMAT, obj::FORMAT];
+pub(crate) const FORMATS: [Format; 6] = [GLTF, FBX, ply::FORMAT, stl::FORMAT, off::FORMAT, obj::FORMAT];
 
 /// glTF and GLB.
 pub(crate) const GLTF: Format = Format {
@@ -32,12 +33,16 @@ pub(crate) const GLTF: Format = Format {
     images: |source, _| gltf::materials::images(source),
 };
 
+/// FBX, which is read as a glTF document.
+const FBX: Format =
+    Format { name: fbx::NAME, titles: &["FBX"], extensions: &[fbx::NAME], is_like: fbx::is_like, ..GLTF };
+
 /// How a format is recognized and read.
 pub(crate) struct Format {
     /// Its name in reports.
     pub(crate) name: &'static str,
     /// Its names in messages.
-    titles: &'static [&'static str],
+    pub(crate) titles: &'static [&'static str],
     /// The extensions of its files, in small letters.
     extensions: &'static [&'static str],
     /// Returns true for content of the format.
@@ -62,9 +67,9 @@ impl Format {
         images: |_, _| Ok(Vec::new()),
     };
 
-    /// Returns true for glTF, whose files hold scenes.
-    pub(crate) fn is_gltf(&self) -> bool {
-        self.name == GLTF.name
+    /// Returns true for glTF and what is read like it: formats whose files hold scenes.
+    pub(crate) fn is_scene(&self) -> bool {
+        [GLTF.name, FBX.name].contains(&self.name)
     }
 
     /// Reads a source with its own rows.
@@ -76,6 +81,11 @@ impl Format {
 /// Returns the extensions of model files, in small letters.
 pub fn extensions() -> impl Iterator<Item = &'static str> {
     FORMATS.iter().flat_map(|format| format.extensions).copied()
+}
+
+/// Returns true if a file is compiled as a scene, by its extension.
+pub fn is_scene(path: &Path) -> bool {
+    by_extension(extension(path).as_deref()).is_some_and(Format::is_scene)
 }
 
 fn extension(path: &Path) -> Option<String> {
@@ -160,6 +170,8 @@ mod tests {
             (b"COFF\n3 1 0", "off"),
             (b"\xEF\xBB\xBFv 1 2 3\n", "obj"),
             (b"# comment\n\nv 1 2 3\n", "obj"),
+            (b"Kaydara FBX Binary  \0\x1A\0", "fbx"),
+            (b"; FBX 7.5.0 project file\n", "fbx"),
             (b"PK\x03\x04", ""),
             (b"", ""),
         ] {

@@ -23,14 +23,14 @@ use crate::text::shown;
 
 /// Reads the cut-outs of a document's default scene, as [`crate::import()`] reads it.
 pub(crate) fn flat(source: &Source<'_>, looks: Looks) -> Result<Cutouts> {
-    let file = GltfFile::open(source, Use::Flat)?;
+    let file = GltfFile::open(source, Use::Flat, looks.polygons)?;
     let (placed, _) = placed_meshes(&file)?;
     Ok(placed_cutouts(&file, looks, &[placed])?.swap_remove(0))
 }
 
 /// Reads the cut-outs of parts, as [`crate::import_gltf_parts`] reads them.
 pub(crate) fn parts(source: &Source<'_>, looks: Looks, parts: &[GltfPart]) -> Result<Vec<Cutouts>> {
-    let file = GltfFile::open(source, Use::Parts)?;
+    let file = GltfFile::open(source, Use::Parts, looks.polygons)?;
     let model = |part: &GltfPart| Ok(vec![part.placed(&file)?]);
     let models = parts.iter().map(model).collect::<Result<Vec<_>>>()?;
     placed_cutouts(&file, looks, &models)

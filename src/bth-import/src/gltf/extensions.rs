@@ -10,7 +10,7 @@ pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_c
 /// Changes the texture coordinates of a texture.
 pub(super) const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 /// Hides nodes and all that are below them.
-pub(super) const VISIBILITY: &str = "KHR_node_visibility";
+pub(crate) const VISIBILITY: &str = "KHR_node_visibility";
 /// Places a mesh many times.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 /// Moves any number of a document.

@@ -8,7 +8,9 @@ use std::cell::OnceCell;
 use crate::error::{Error, Result};
 use crate::gltf::container::split;
 use crate::gltf::extensions::{Use, VISIBILITY, unsupported_extension};
+use crate::gltf::fbx;
 use crate::gltf::schema::{GltfDocument, GltfNode, Visibility};
+use crate::mesh::Polygons;
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
 use crate::text::shown;
 
@@ -23,6 +25,8 @@ const CONVERT: &str = "convert the model to glTF 2.0";
 /// A document and the bytes behind it. Buffers are read and views are decompressed at first use.
 pub(crate) struct GltfFile<'a> {
     pub(crate) source: &'a Source<'a>,
+    /// Name of the format.
+    pub(super) format: &'static str,
     pub(crate) document: GltfDocument,
     /// The binary chunk of a GLB.
     pub(super) binary: Option<&'a [u8]>,
@@ -35,9 +39,16 @@ pub(crate) struct GltfFile<'a> {
 const LAST_ROW: f64 = 1e-6;
 
 impl<'a> GltfFile<'a> {
-    /// Reads the document and refuses required extensions that this use of it does not read.
-    pub(crate) fn open(source: &'a Source<'a>, used: Use) -> Result<Self> {
+    /// Reads the document, or makes one from a file of another format, whose `polygons` become
+    /// triangles. Refuses required extensions that this use of it does not read.
+    pub(crate) fn open(source: &'a Source<'a>, used: Use, polygons: Polygons) -> Result<Self> {
         source.fetched()?;
+        if fbx::is_fbx(source) {
+            let (document, bytes) = fbx::document(source, used, polygons)?.finish();
+            let loaded = vec![OnceCell::from(Cow::Owned(bytes))];
+            let decompressed = document.buffer_views.iter().map(|_| OnceCell::new()).collect();
+            return Ok(GltfFile { source, format: fbx::NAME, document, binary: None, loaded, decompressed });
+        }
         let (json, binary) = split(source)?;
         let unsupported = |message| source.error_in_part(UNSUPPORTED, "asset", message, CONVERT);
         let document: GltfDocument = serde_json::from_slice(json).map_err(|e| {
@@ -63,12 +74,17 @@ impl<'a> GltfFile<'a> {
         }
         let loaded = document.buffers.iter().map(|_| OnceCell::new()).collect();
         let decompressed = document.buffer_views.iter().map(|_| OnceCell::new()).collect();
-        let file = GltfFile { source, document, binary, loaded, decompressed };
+        let file = GltfFile { source, format: "gltf", document, binary, loaded, decompressed };
         file.check_transforms()?;
         match file.document.extensions_required.iter().find(|name| !used.reads(name)) {
             Some(name) => Err(unsupported_extension(source, name)),
             None => Ok(file),
         }
+    }
+
+    /// Returns true if the document is made from a file of another format.
+    pub(super) fn is_made(&self) -> bool {
+        self.format == fbx::NAME
     }
 
     /// An error in a part of the document.

@@ -15,7 +15,7 @@ use crate::gltf::placed_mesh::{GltfPart, PlacedMesh, placed_meshes};
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
 use crate::gltf::rest_pose::RestPose;
 use crate::gltf::rigid_parts::{KeptTriangles, Selection};
-use crate::gltf::schema::{GltfDocument, GltfMesh};
+use crate::gltf::schema::{Faces, GltfDocument, GltfMesh};
 use crate::gltf::transform;
 use crate::mesh::{Keep, Wanted};
 use crate::raw::{Raw, RowKind, check_triangles};
@@ -57,7 +57,7 @@ struct Flattener<'r, 'd, 'a> {
 /// Reads a glTF or GLB file: its default scene, else its first, else all root nodes, at rest and
 /// without hidden nodes. Counts each segment of lines and each point as skipped.
 pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>> {
-    let file = GltfFile::open(source, Use::Flat)?;
+    let file = GltfFile::open(source, Use::Flat, wanted.polygons)?;
     let (document, monitor) = (&file.document, source.monitor);
     if document.extensions_used.iter().any(|name| name == INSTANCING) {
         monitor.warn("EXT_mesh_gpu_instancing is ignored: each of its meshes is read once");
@@ -81,7 +81,7 @@ pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>
 fn exact_positions(file: &GltfFile<'_>, placed: &[PlacedMesh]) -> Result<Vec<[f64; 3]>> {
     let mut flattener = Flattener::new(
         file,
-        Raw::new("gltf", Box::new(|_, _| Place::File(PathBuf::new()))),
+        Raw::new(file.format, Box::new(|_, _| Place::File(PathBuf::new()))),
         Wanted::default(),
     );
     flattener.exact = Some(Vec::new());
@@ -111,7 +111,7 @@ fn read_placed<'a>(
     deformation: Option<RawDeformation>,
 ) -> Result<Raw<'a>> {
     let no_place = Box::new(|_: RowKind, _: usize| Place::File(source.path.to_owned()));
-    let raw = Raw { deformation, ..Raw::new("gltf", no_place) };
+    let raw = Raw { deformation, ..Raw::new(file.format, no_place) };
     let mut flattener = Flattener::new(file, raw, wanted);
     for (done, mesh) in placed.iter().enumerate() {
         source.progress(source.data.len() / placed.len() * done)?;
@@ -212,7 +212,7 @@ impl Flattener<'_, '_, '_> {
         if self.wanted.materials {
             self.append_looks(reader, &triangles)?;
         }
-        self.append(&triangles, &world)
+        self.append(&triangles, &primitive.faces, &world)
     }
 
     /// Adds the colours and the second texture coordinates of the corners of a primitive's
@@ -264,9 +264,11 @@ impl Flattener<'_, '_, '_> {
     }
 
     /// Appends a primitive's rows in world space.
-    fn append(&mut self, triangles: &Triangles, world: &DAffine3) -> Result<()> {
+    fn append(&mut self, triangles: &Triangles, faces: &Faces, world: &DAffine3) -> Result<()> {
         let (raw, corners) = (&mut self.raw, &triangles.corners);
-        raw.skipped += triangles.skipped;
+        raw.skipped += triangles.skipped + faces.skipped;
+        raw.polygons += faces.polygons;
+        raw.concave.add(&faces.concave, raw.triangles.len());
         check_triangles((raw.triangles.len() + corners.len()) as u64)?;
         let rows_from = |first: usize| {
             let row = move |i: u32| first as u32 + i;

@@ -16,6 +16,7 @@ use crate::gltf::texture_reader::TextureReader;
 use crate::gltf::uv_set::UvSet;
 use crate::image_file;
 use crate::materials::{ImageFile, MaterialRecorder, NO_GLOSS, Unreadable, warn_left_out};
+use crate::mesh::Polygons;
 use crate::source::Source;
 use crate::text::shown;
 
@@ -252,7 +253,7 @@ impl GltfDocument {
 
 /// Returns the images of all materials of a document that can be read.
 pub(crate) fn images(source: &Source<'_>) -> Result<Vec<ImageFile>> {
-    let file = &GltfFile::open(source, Use::Parts)?;
+    let file = &GltfFile::open(source, Use::Parts, Polygons::default())?;
     let textures = TextureReader { file, without: WITHOUT };
     let used = file.document.kept_textures().into_iter();
     let numbers: BTreeSet<usize> = used.filter_map(|texture| textures.texture(texture).ok()?.image).collect();

@@ -5,6 +5,7 @@
 //! decompresses them, `uv_set` chooses texture coordinates), `rigid_parts` which of them a joint
 //! moves alone, `placed_mesh` which meshes there are and where, and `flatten` a model. `materials`
 //! reads how they look, `cutout` which materials make holes. [`scene`] makes a manifest instead.
+//! `fbx` makes a document of another format (`made`).
 
 mod accessor;
 mod alpha_image;
@@ -14,8 +15,10 @@ pub(crate) mod cutout;
 mod deformation;
 mod draco;
 pub(crate) mod extensions;
+pub(crate) mod fbx;
 pub(crate) mod file;
 pub(crate) mod flatten;
+mod made;
 mod material;
 pub(crate) mod materials;
 mod meshopt;

@@ -60,11 +60,15 @@ pub(super) struct PrimitiveReader<'p, 'a> {
 impl<'p, 'a> PrimitiveReader<'p, 'a> {
     /// Returns readers of the primitives of a mesh, none for a mesh that does not exist.
     pub(super) fn of_mesh(file: &'p GltfFile<'a>, mesh: usize) -> impl Iterator<Item = Self> {
-        let primitives = file.document.meshes.get(mesh).map_or(&[][..], |mesh| &mesh.primitives);
+        let found = file.document.meshes.get(mesh);
+        // Only numbers tell glTF meshes apart. What other formats call a mesh has its name.
+        let name = found.map_or("", |mesh| mesh.name.as_str());
+        let name = if file.is_made() { format!("mesh \"{name}\"") } else { format!("mesh {mesh}") };
+        let primitives = found.map_or(&[][..], |mesh| &mesh.primitives);
         primitives.iter().enumerate().map(move |(index, primitive)| PrimitiveReader {
             file,
             primitive,
-            part: format!("mesh {mesh} primitive {index}"),
+            part: format!("{name} primitive {index}"),
         })
     }
 }

@@ -6,95 +6,113 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use serde_json::Value;
 
+use crate::concave::ConcavePolygons;
+
 /// Extensions by name, each parsed where it is read.
-pub(super) type Extensions = BTreeMap<String, Value>;
+pub(crate) type Extensions = BTreeMap<String, Value>;
 
 /// The document.
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
 pub(crate) struct GltfDocument {
-    pub(super) asset: GltfAsset,
+    pub(crate) asset: GltfAsset,
     pub(super) extensions_required: Vec<String>,
     pub(super) extensions_used: Vec<String>,
-    pub(super) scene: Option<usize>,
-    pub(super) scenes: Vec<GltfScene>,
-    pub(super) nodes: Vec<GltfNode>,
-    pub(super) meshes: Vec<GltfMesh>,
+    pub(crate) scene: Option<usize>,
+    pub(crate) scenes: Vec<GltfScene>,
+    pub(crate) nodes: Vec<GltfNode>,
+    pub(crate) meshes: Vec<GltfMesh>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
     pub(super) buffers: Vec<Buffer>,
-    pub(super) skins: Vec<GltfSkin>,
+    pub(crate) skins: Vec<GltfSkin>,
     // Parsed at use: what is malformed there must not fail the import of meshes.
-    pub(super) animations: Vec<Value>,
-    pub(super) cameras: Vec<Value>,
-    pub(super) materials: Vec<Value>,
-    pub(super) textures: Value,
-    pub(super) images: Value,
-    pub(super) samplers: Value,
-    pub(super) extensions: Extensions,
+    pub(crate) animations: Vec<Value>,
+    pub(crate) cameras: Vec<Value>,
+    pub(crate) materials: Vec<Value>,
+    pub(crate) textures: Value,
+    pub(crate) images: Value,
+    pub(crate) samplers: Value,
+    pub(crate) extensions: Extensions,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
-pub(super) struct GltfAsset {
-    pub(super) version: String,
+pub(crate) struct GltfAsset {
+    pub(crate) version: String,
     /// The version that readers of the document must know.
-    pub(super) min_version: Option<String>,
+    pub(crate) min_version: Option<String>,
+    /// Of a document that is made from another format: the units and axes of the file.
+    #[serde(skip)]
+    pub(crate) space: Option<String>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(super) struct GltfScene {
-    pub(super) name: String,
-    pub(super) nodes: Vec<usize>,
+pub(crate) struct GltfScene {
+    pub(crate) name: String,
+    pub(crate) nodes: Vec<usize>,
 }
 
 /// A node. Numbers are f64 so that world transforms round once, when positions become f32.
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(super) struct GltfNode {
-    pub(super) name: String,
-    pub(super) children: Vec<usize>,
-    pub(super) camera: Option<usize>,
-    pub(super) extensions: Extensions,
-    pub(super) mesh: Option<usize>,
-    pub(super) skin: Option<usize>,
-    pub(super) matrix: Option<[f64; 16]>,
-    pub(super) translation: Option<[f64; 3]>,
-    pub(super) rotation: Option<[f64; 4]>,
-    pub(super) scale: Option<[f64; 3]>,
+pub(crate) struct GltfNode {
+    pub(crate) name: String,
+    pub(crate) children: Vec<usize>,
+    pub(crate) camera: Option<usize>,
+    pub(crate) extensions: Extensions,
+    pub(crate) mesh: Option<usize>,
+    pub(crate) skin: Option<usize>,
+    pub(crate) matrix: Option<[f64; 16]>,
+    pub(crate) translation: Option<[f64; 3]>,
+    pub(crate) rotation: Option<[f64; 4]>,
+    pub(crate) scale: Option<[f64; 3]>,
     /// Weights of the morph targets. They replace the mesh's own.
-    pub(super) weights: Option<Vec<f64>>,
+    pub(crate) weights: Option<Vec<f64>>,
 }
 
 /// A skin. Its skeleton root has no bearing on positions and is not read.
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
-pub(super) struct GltfSkin {
-    pub(super) name: String,
-    pub(super) inverse_bind_matrices: Option<usize>,
-    pub(super) joints: Vec<usize>,
+pub(crate) struct GltfSkin {
+    pub(crate) name: String,
+    pub(crate) inverse_bind_matrices: Option<usize>,
+    pub(crate) joints: Vec<usize>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(super) struct GltfMesh {
-    pub(super) name: String,
-    pub(super) primitives: Vec<Primitive>,
+pub(crate) struct GltfMesh {
+    pub(crate) name: String,
+    pub(crate) primitives: Vec<Primitive>,
     /// Default weights of the morph targets.
-    pub(super) weights: Option<Vec<f64>>,
+    pub(crate) weights: Option<Vec<f64>>,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Deserialize, Default, Clone)]
 #[serde(default)]
-pub(super) struct Primitive {
-    pub(super) attributes: BTreeMap<String, usize>,
-    pub(super) indices: Option<usize>,
-    pub(super) material: Option<usize>,
-    pub(super) mode: Option<u64>,
+pub(crate) struct Primitive {
+    pub(crate) attributes: BTreeMap<String, usize>,
+    pub(crate) indices: Option<usize>,
+    pub(crate) material: Option<usize>,
+    pub(crate) mode: Option<u64>,
     /// Morph targets: accessors by the names of attributes, parsed where they are read.
-    pub(super) targets: Vec<Value>,
-    pub(super) extensions: Extensions,
+    pub(crate) targets: Vec<Value>,
+    pub(crate) extensions: Extensions,
+    /// Of a document that is made from another format: what its faces were.
+    #[serde(skip)]
+    pub(crate) faces: Faces,
+}
+
+/// What the faces of a primitive were before they became triangles.
+#[derive(Clone, Default)]
+pub(crate) struct Faces {
+    /// Those of more than three corners.
+    pub(crate) polygons: u64,
+    /// Those of fewer than three.
+    pub(crate) skipped: u64,
+    pub(crate) concave: ConcavePolygons,
 }
 
 /// KHR_draco_mesh_compression of a primitive.
@@ -144,7 +162,7 @@ pub(super) struct SparseValues {
     pub(super) byte_offset: u64,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Default)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct BufferView {
     pub(super) buffer: usize,
@@ -154,6 +172,13 @@ pub(super) struct BufferView {
     pub(super) byte_stride: Option<u64>,
     #[serde(default)]
     pub(super) extensions: Extensions,
+}
+
+impl BufferView {
+    /// A view of bytes of the first buffer.
+    pub(super) fn at(byte_offset: u64, byte_length: u64) -> BufferView {
+        BufferView { byte_offset, byte_length, ..BufferView::default() }
+    }
 }
 
 /// EXT_meshopt_compression or KHR_meshopt_compression of a buffer view: where its stream is and

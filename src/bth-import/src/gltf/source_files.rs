@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use crate::cutout::AlphaMode;
 use crate::error::Result;
 use crate::gltf::container::split;
-use crate::gltf::extensions::MESHOPT;
+use crate::gltf::extensions::{MESHOPT, Use};
+use crate::gltf::fbx;
 use crate::gltf::schema::{Buffer, GltfDocument, MeshoptFallback};
 use crate::gltf::uri::beside;
 use crate::materials::Looks;
@@ -20,8 +22,7 @@ use crate::source::{Source, read_file};
 pub(crate) fn files(path: &Path, looks: Looks) -> Result<Vec<PathBuf>> {
     let data = read_file(path)?;
     let source = Source::new(path, &data, &Silent);
-    let json = split(&source).map_or(&[][..], |(json, _)| json);
-    let Ok(document) = serde_json::from_slice::<GltfDocument>(json) else { return Ok(Vec::new()) };
+    let Some(document) = document(&source, looks) else { return Ok(Vec::new()) };
     let mut textures: Vec<usize> = document.cutout_textures(looks.alpha).collect();
     if looks.materials {
         textures.extend(document.kept_textures());
@@ -35,6 +36,19 @@ pub(crate) fn files(path: &Path, looks: Looks) -> Result<Vec<PathBuf>> {
         beside(path, uri).filter(|file| !is_fallback(&buffer) || file.exists())
     };
     Ok(document.buffers.into_iter().filter_map(file).chain(images).collect())
+}
+
+/// Returns the document, if there is one and it can name other files.
+fn document(source: &Source<'_>, looks: Looks) -> Option<GltfDocument> {
+    if fbx::is_fbx(source) {
+        // Its meshes are in the file itself.
+        let has_images = looks.materials || looks.alpha != AlphaMode::None;
+        return has_images
+            .then(|| fbx::document(source, Use::Parts, looks.polygons).ok())
+            .flatten()
+            .map(|made| made.document);
+    }
+    serde_json::from_slice(split(source).ok()?.0).ok()
 }
 
 fn is_fallback(buffer: &Buffer) -> bool {

@@ -84,12 +84,12 @@ fn import_frames(
     finish(raw, Some(frames), wanted, monitor)
 }
 
-/// Reads a source whose vertices have an order, which glTF does not have.
+/// Reads a source whose vertices have an order, which scenes do not have.
 fn read_single<'a>(source: &'a Source<'a>, wanted: Wanted, role: Role) -> Result<Raw<'a>> {
     let format = format(source)?;
-    if format.is_gltf() {
+    if format.is_scene() {
         let Role(what, hint) = role;
-        let message = format!("expected an OBJ, PLY, STL or OFF file as {what}, found glTF");
+        let message = format!("expected an OBJ, PLY, STL or OFF file as {what}, found {}", format.titles[0]);
         return Err(source.error(UNSUPPORTED, message, hint));
     }
     let raw = format.read(source, wanted)?;

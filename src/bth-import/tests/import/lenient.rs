@@ -11,7 +11,12 @@ fn lenient_wanted() -> Wanted {
     Wanted { unreadable: Unreadable::LeftOut, ..everything() }
 }
 
-const LOOKS: Looks = Looks { alpha: AlphaMode::Mask, materials: true, unreadable: Unreadable::LeftOut };
+const LOOKS: Looks = Looks {
+    alpha: AlphaMode::Mask,
+    materials: true,
+    unreadable: Unreadable::LeftOut,
+    polygons: bth_import::Polygons::Fans,
+};
 
 /// A PNG image of one texel, as far as its header tells.
 fn image(width: u32) -> Vec<u8> {

@@ -6,6 +6,8 @@ mod concave;
 mod cutouts;
 mod damaged_scenes;
 mod data;
+#[cfg(feature = "fbx")]
+mod fbx;
 mod gltf;
 mod gltf_nodes;
 mod groups;

@@ -91,8 +91,8 @@ pub(crate) struct Compile {
     /// Print nothing but warnings and errors.
     #[arg(short, long)]
     pub(crate) quiet: bool,
-    /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and
-    /// animation.
+    /// Make one object of a glTF or FBX file: its scene at rest, in world space, without hierarchy
+    /// and animation.
     #[arg(long, help_heading = GLTF, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "rigid_parts", "strict"])]
     pub(crate) flatten: bool,
     #[command(flatten)]

@@ -174,11 +174,13 @@ fn warn_of_options(args: &Compile, jobs: &[Job], monitor: &dyn Monitor) {
     {
         monitor.warn(&format!("--flatten has no effect on {}, which is a manifest", job.model.display()));
     }
-    let is_gltf_scene = |job: &Job| scene::is_gltf(&job.model) && scene::is_scene(&job.model, args);
+    let is_gltf_scene = |job: &Job| bth_import::is_scene(&job.model) && scene::is_scene(&job.model, args);
     if let Some(option) = args.gltf.given()
         && !jobs.iter().any(is_gltf_scene)
     {
-        monitor.warn(&format!("{option} has no effect: no model is a glTF file that is compiled as a scene"));
+        monitor.warn(&format!(
+            "{option} has no effect: no model is a glTF or FBX file that is compiled as a scene"
+        ));
     }
     if !jobs.iter().any(|job| scene::is_scene(&job.model, args)) {
         let poses = args.selection.settings.iter().any(|setting| setting.name() == "poses");

@@ -1,6 +1,6 @@
-//! `bthc import`: writes a scene manifest for a glTF file.
+//! `bthc import`: writes a scene manifest for a glTF or FBX file.
 
-use super::scene::{folder, is_gltf};
+use super::scene::folder;
 use crate::args::Import;
 use crate::failure::Failure;
 use crate::output;
@@ -13,8 +13,8 @@ use serde_json::json;
 use std::path::{Component, Path};
 
 pub(crate) fn run(args: &Import) -> Result<(), Failure> {
-    if !is_gltf(&args.model) {
-        let message = format!("{} is no glTF or GLB file", args.model.display());
+    if !bth_import::is_scene(&args.model) {
+        let message = format!("{} is no glTF, GLB or FBX file", args.model.display());
         return Err(Failure::Usage { message, hint: "manifests of other models are written by hand" });
     }
     let path = args.output.clone().unwrap_or_else(|| args.model.with_extension("manifest"));
@@ -54,7 +54,7 @@ fn name_from(folder: &Path, model: &Path) -> Result<String, Failure> {
     let Ok(inside) = model.strip_prefix(&folder) else {
         return Err(Failure::Usage {
             message: format!("{} does not lie below {}", model.display(), folder.display()),
-            hint: "write the manifest beside the glTF file or in a folder above it",
+            hint: "write the manifest beside that file or in a folder above it",
         });
     };
     let parts: Option<Vec<&str>> = inside
@@ -87,6 +87,9 @@ fn name_or_number(name: &str) -> String {
 pub(super) fn facts(report: &ImportReport) -> Table {
     let mut table = Table::default();
     table.row(["scene", &name_or_number(&report.scene)]);
+    if let Some(space) = &report.space {
+        table.row(["space", space]);
+    }
     table.row(["nodes", &count(report.nodes)]);
     table.row(["instances", &count(report.instances)]);
     table.row(["objects", &count(report.objects)]);

@@ -1,4 +1,4 @@
-//! `bthc compile` of scenes: glTF files and manifests.
+//! `bthc compile` of scenes: glTF and FBX files and manifests.
 
 use super::deliver::deliver;
 use super::job::{self, Job, JobContext, JobReport, Target};
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// Returns true if a model is compiled as a scene.
 pub(super) fn is_scene(model: &Path, args: &Compile) -> bool {
-    is_manifest(model) || is_gltf(model) && !args.flatten
+    is_manifest(model) || bth_import::is_scene(model) && !args.flatten
 }
 
 fn has_extension(path: &Path, extensions: &[&str]) -> bool {
@@ -30,17 +30,12 @@ fn is_manifest(path: &Path) -> bool {
     has_extension(path, &["manifest", "toml"])
 }
 
-/// Returns true if a path names a glTF file.
-pub(super) fn is_gltf(path: &Path) -> bool {
-    has_extension(path, &["gltf", "glb"])
-}
-
 /// The folder to which paths in a scene are relative.
 pub(super) fn folder(scene: &Path) -> &Path {
     scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Reads a manifest, or makes one from a glTF file.
+/// Reads a manifest, or makes one from another file.
 fn read(
     model: &Path,
     gltf: &Gltf,
@@ -123,15 +118,15 @@ pub(super) fn dry_run(
 
 /// All files that a scene is made from.
 pub(super) fn inputs(model: &Path, looks: Looks) -> Result<Vec<PathBuf>, Failure> {
-    if is_gltf(model) {
+    if bth_import::is_scene(model) {
         return Ok(source::files(model, looks)?);
     }
     Ok(files(&bth_scene::read(model)?, model, looks)?)
 }
 
-/// All files that a scene with this manifest, or the glTF file that it was read from, is made from.
+/// All files that a scene with this manifest, or the file that it was read from, is made from.
 fn files(manifest: &Manifest, model: &Path, looks: Looks) -> bth_compile::Result<Vec<PathBuf>> {
-    if is_gltf(model) {
+    if bth_import::is_scene(model) {
         return source::files(model, looks);
     }
     scene::files(manifest, model, looks)

@@ -16,6 +16,7 @@ use self::importer::Importer;
 use crate::error::{Place, Result};
 use crate::gltf::extensions::Use;
 use crate::gltf::file::GltfFile;
+use crate::mesh::Polygons;
 use crate::monitor::Monitor;
 use crate::source::{Source, UNSUPPORTED, input_error, read_file};
 
@@ -69,6 +70,9 @@ impl Default for ImportOptions {
 pub struct ImportReport {
     /// Name or number of the scene.
     pub scene: String,
+    /// Units and axes of a file of another format, and what became of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub space: Option<String>,
     /// Nodes of the manifest.
     pub nodes: u64,
     /// Nodes that place an object.
@@ -136,7 +140,7 @@ pub fn import_bytes(
 ) -> Result<(Manifest, ImportReport)> {
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(path, data, monitor);
-    let file = GltfFile::open(&source, Use::Scene)?;
+    let file = GltfFile::open(&source, Use::Scene, Polygons::default())?;
     let mut importer = Importer::new(&file, name, options);
     let animations = importer.animations(&options.animation)?;
     importer.nodes(options)?;
@@ -172,6 +176,7 @@ fn last_frame(last_key: f64, rate: f64) -> i32 {
 fn finish(importer: Importer<'_, '_>) -> (Manifest, ImportReport) {
     let manifest = importer.manifest;
     let report = ImportReport {
+        space: importer.file.document.asset.space.clone(),
         nodes: manifest.nodes.len() as u64,
         instances: manifest.nodes.iter().filter(|n| n.object.is_some()).count() as u64,
         objects: manifest.objects.len() as u64,

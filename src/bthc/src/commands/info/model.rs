@@ -1,7 +1,7 @@
 //! `bthc info` of a model that is not compiled: what reading it finds.
 
 use super::{groups_table, point};
-use crate::commands::{import, scene::is_gltf};
+use crate::commands::import;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::table::{Table, count};
@@ -11,12 +11,12 @@ use bth_import::{Mesh, Report, Silent, Wanted};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Reads a model, of a glTF file also what becomes a scene by default and what is skipped. Returns
-/// the JSON and the text.
+/// Reads a model, of a glTF or FBX file also what becomes a scene by default and what is skipped.
+/// Returns the JSON and the text.
 pub(super) fn tell(path: &Path, as_json: bool) -> Result<(Value, String), Failure> {
     let progress = Progress::new(as_json);
     let wanted = Wanted { groups: true, ..Wanted::default() };
-    if !is_gltf(path) {
+    if !bth_import::is_scene(path) {
         let (mesh, report) = bth_import::import(path, wanted, &progress)?;
         return Ok(found(&mesh, &report));
     }

@@ -32,8 +32,8 @@ fn file(texture: &Texture) -> &Texture {
     texture.file_textures.iter().next().map_or(texture, |file| file)
 }
 
-/// An image in the file, or one next to it by the last part of its name: paths in FBX files are
-/// those of the machine that wrote them.
+/// An image in the file, or one next to it by the last part of its name: paths in FBX files
+/// belong to the machine that wrote them.
 fn image(texture: &Texture, made: &mut Made) -> Value {
     if !texture.content.is_empty() {
         return json!({"bufferView": made.view(&texture.content)});

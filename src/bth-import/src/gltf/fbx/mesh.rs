@@ -88,8 +88,8 @@ fn numbers(v: &Vec3) -> [f64; 3] {
     [v.x, v.y, v.z]
 }
 
-/// The middle of a mesh far from its origin, where f32 would move vertices by more than 2^-24 of its
-/// size. What skins and shapes move stays where it is.
+/// The middle of a mesh far from its origin, where f32 would move vertices by more than 2^-24 of
+/// its size. What skins and shapes move stays where it is.
 fn center(mesh: &Mesh) -> Option<[f64; 3]> {
     let finite = || mesh.vertices.iter().map(numbers).filter(|p| p.iter().all(|x| x.is_finite()));
     let first = finite().next()?;
@@ -233,7 +233,7 @@ impl<'m> CornerRows<'m> {
         if mesh.vertex_color.exists {
             add("COLOR_0", made.floats(corners().map(|corner| self.color(corner))));
         }
-        let Some(skin) = mesh.skin_deformers.iter().next() else { return primitive };
+        let Some(skin) = first_skin(mesh) else { return primitive };
         let influences: Vec<_> =
             (0..self.corners.len()).map(|row| influences(skin, self.vertex(row))).collect();
         let most = influences.iter().map(Vec::len).max().unwrap_or(0);
@@ -265,6 +265,12 @@ impl<'m> CornerRows<'m> {
     }
 }
 
+/// The skin of a mesh, if 16 bits can number its joints.
+fn first_skin(mesh: &Mesh) -> Option<&SkinDeformer> {
+    let first = mesh.skin_deformers.iter().next()?;
+    (first.clusters.count < usize::from(u16::MAX)).then_some(first)
+}
+
 /// What moves a vertex: at most eight joints and their weights, the largest. Without any it follows
 /// the node of its mesh, which is the joint after all others.
 fn influences(skin: &SkinDeformer, vertex: usize) -> Vec<(u16, f32)> {
@@ -284,7 +290,7 @@ fn influences(skin: &SkinDeformer, vertex: usize) -> Vec<(u16, f32)> {
 
 /// Adds the skin of a mesh at a node.
 pub(super) fn skin(mesh: &Mesh, node: &Node, made: &mut Made) -> Option<usize> {
-    let skin = mesh.skin_deformers.iter().next()?;
+    let skin = first_skin(mesh)?;
     let joint = |node: &Node| node.element.typed_id as usize;
     let clusters =
         || skin.clusters.iter().filter_map(|cluster| Some((cluster.bone_node.as_deref()?, cluster)));

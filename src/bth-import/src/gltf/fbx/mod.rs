@@ -1,7 +1,7 @@
 //! FBX, read by the library ufbx into a glTF document.
 //!
-//! `load` opens the file, `scene` makes nodes, cameras and lights, `mesh` meshes with their skins and
-//! shapes, `material` materials with their textures, and `motion` animations.
+//! `load` opens the file, `scene` makes nodes, cameras and lights, `mesh` meshes with their skins
+//! and shapes, `material` materials with their textures, and `motion` animations.
 
 #[cfg(feature = "fbx")]
 mod load;

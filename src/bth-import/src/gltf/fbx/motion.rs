@@ -109,8 +109,8 @@ fn weights(scene: &Scene, stack: &AnimStack, baked: &BakedAnim, keys: &mut Keys<
         if times.is_empty() {
             continue;
         }
-        // The keys were moved to begin at 0.
-        let start = baked.playback_time_begin;
+        // The keys were moved so that the stack begins at 0, unless it begins before.
+        let start = stack.anim.time_begin.max(0.0);
         let weight = |time: &f64| {
             let at = time + start;
             targets(mesh).map(move |(channel, _)| [channel.evaluate_blend_weight(&stack.anim, at) as f32])

@@ -53,7 +53,7 @@ fn nodes(source: &Source<'_>, scene: &Scene, polygons: Polygons, made: &mut Made
     for node in &scene.nodes {
         let mut new = place(source, node, scene.metadata.version < FIRST_WITH_VISIBILITY)?;
         if let Some(mesh) = node.mesh.as_deref() {
-            // The node of a geometric transform has the mesh of its parent, which has the materials.
+            // The node of a geometric transform has the mesh of its parent, not the materials.
             let holder = node.parent.as_deref().filter(|_| node.is_geometry_transform_helper).unwrap_or(node);
             let (id, materials) = (mesh.element.typed_id, &holder.materials);
             let key = (id, materials.iter().map(|material| material.element.typed_id).collect::<Vec<_>>());
@@ -121,14 +121,14 @@ fn place(source: &Source<'_>, node: &Node, is_old: bool) -> Result<GltfNode> {
     })
 }
 
-/// A number of 37 bits. The sines of rotations are those of the system's library, whose last bits
-/// differ between machines. Files do not depend on them.
+/// A number of 37 bits. The system's library computes the sines of rotations, whose last bits differ
+/// between machines. Files do not depend on them.
 fn steady(x: f64) -> f64 {
     const DROPPED: u64 = 1 << 16;
     f64::from_bits(x.to_bits().wrapping_add(DROPPED / 2) & !(DROPPED - 1))
 }
 
-/// A camera, unless its lens is none. Cut planes that are none do not count.
+/// A camera, unless its lens has no size. Cut planes count where they can be.
 fn camera(camera: &Camera) -> Option<Value> {
     let is_good = |x: f64| x.is_finite() && x > 0.0;
     let znear = Some(camera.near_plane).filter(|x| is_good(*x)).unwrap_or(0.0);
@@ -147,8 +147,7 @@ fn camera(camera: &Camera) -> Option<Value> {
     (is_good(angle) && angle < 180.0).then(|| json!({"name": name, "perspective": lens}))
 }
 
-/// A point, directional or spot light. A lamp of FBX has no unit; its intensity is taken for that of
-/// glTF.
+/// A point, directional or spot light. A lamp of FBX has no unit: glTF gets the same number.
 fn light(light: &Light) -> Option<Value> {
     let kind = match light.type_ {
         LightType::Point => "point",

@@ -121,8 +121,8 @@ fn place(source: &Source<'_>, node: &Node, is_old: bool) -> Result<GltfNode> {
     })
 }
 
-/// A number of 37 bits. The system's library computes the sines of rotations, whose last bits differ
-/// between machines. Files do not depend on them.
+/// A number of 37 bits. The system's library computes the sines of rotations. Their last bits
+/// differ between machines, and files do not depend on them.
 fn steady(x: f64) -> f64 {
     const DROPPED: u64 = 1 << 16;
     f64::from_bits(x.to_bits().wrapping_add(DROPPED / 2) & !(DROPPED - 1))

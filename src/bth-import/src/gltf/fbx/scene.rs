@@ -100,7 +100,8 @@ fn place(source: &Source<'_>, node: &Node, is_old: bool) -> Result<GltfNode> {
         _ => own,
     };
     let ufbx::Transform { translation: t, rotation: r, scale: s } = &node.local_transform;
-    let numbers = [t.x, t.y, t.z, r.x, r.y, r.z, r.w, s.x, s.y, s.z].map(steady);
+    let [x, y, z, a, b, c, d] = [t.x, t.y, t.z, r.x, r.y, r.z, r.w].map(steady);
+    let numbers = [x, y, z, a, b, c, d, s.x, s.y, s.z];
     if !numbers.iter().all(|x| x.is_finite()) {
         let message = format!("expected a finite transform, found {numbers:?}");
         return Err(source.error_in_part(NON_FINITE, format!("node \"{name}\""), message, EXPORT));

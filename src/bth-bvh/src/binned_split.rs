@@ -37,8 +37,8 @@ impl<E: Extent> Centers<E> {
     }
 
     #[inline(always)]
-    fn grow(&mut self, other: &Self) {
-        self.grow_to(&other.lower, &other.upper);
+    fn add(&mut self, center: &E::Orders<f32>) {
+        self.grow_to(center, center);
     }
 
     #[inline(always)]
@@ -79,7 +79,7 @@ impl<E: Extent> Grid<E> {
     /// The cast saturates and turns the NaN of 0 * infinity (extent 0 or nearly so) to 0.
     #[inline(always)]
     fn bin(&self, center: f32, axis: usize) -> usize {
-        (((center - self.origin.as_ref()[axis]) * self.scale.as_ref()[axis]) as usize).min(self.last)
+        (((center - self.origin.as_ref()[axis]) * self.scale.as_ref()[axis]) as u32 as usize).min(self.last)
     }
 
     #[inline(never)]
@@ -106,37 +106,56 @@ fn merge<E: Extent>(mut a: Bins<E>, b: Bins<E>) -> Bins<E> {
 }
 
 /// Bounds of the triangles and the range of their centres.
-pub(super) fn measure<E: Extent>(references: &[Reference<E>]) -> (E, Centers<E>) {
-    fn serial<E: Extent>(references: &[Reference<E>]) -> (E, Centers<E>) {
-        let (mut all, mut centers) = (E::EMPTY, Centers::empty());
+pub(super) struct Measured<E: Extent> {
+    pub(super) bounds: E,
+    pub(super) centers: Centers<E>,
+}
+
+/// Measures triangles.
+pub(super) fn measure<E: Extent>(references: &[Reference<E>]) -> Measured<E> {
+    let empty = || Measured { bounds: E::EMPTY, centers: Centers::empty() };
+    let serial = |references: &[Reference<E>]| {
+        let mut all = empty();
         for reference in references {
-            all.grow(&reference.bounds);
-            let center = reference.bounds.half_center();
-            centers.grow_to(&center, &center);
+            all.bounds.grow(&reference.bounds);
+            all.centers.add(&reference.bounds.half_center());
         }
-        (all, centers)
-    }
+        all
+    };
     if references.len() <= PARALLEL_COUNT {
         return serial(references);
     }
-    let join = |mut a: (E, Centers<E>), b: (E, Centers<E>)| {
-        a.0.grow(&b.0);
-        a.1.grow(&b.1);
+    let join = |mut a: Measured<E>, b: Measured<E>| {
+        a.bounds.grow(&b.bounds);
+        a.centers.grow_to(&b.centers.lower, &b.centers.upper);
         a
     };
-    references.par_chunks(CHUNK).map(serial).reduce(|| (E::EMPTY, Centers::empty()), join)
+    references.par_chunks(CHUNK).map(serial).reduce(empty, join)
 }
 
-/// Partitions the references at the best of the boundaries between `bins` equal slabs per axis and
-/// returns the size of the left side; `None`, with nothing changed, when no boundary separates
-/// them.
+/// Two parts of triangles.
+pub(super) struct Parts<E: Extent> {
+    /// Triangles of the left one.
+    pub(super) left: usize,
+    /// Both, where they are measured already.
+    pub(super) measured: [Option<Measured<E>>; 2],
+}
+
+impl<E: Extent> From<usize> for Parts<E> {
+    fn from(left: usize) -> Self {
+        Parts { left, measured: [None, None] }
+    }
+}
+
+/// Partitions the references at the best of the boundaries between `bins` equal slabs per axis;
+/// `None`, with nothing changed, when no boundary separates them.
 // Keeps its frame out of the frame of the recursion.
 #[inline(never)]
 pub(super) fn split<E: Extent>(
     references: &mut [Reference<E>],
     centers: &Centers<E>,
     bins: usize,
-) -> Option<usize> {
+) -> Option<Parts<E>> {
     let grid = Grid::new(centers, bins);
     let filled = if references.len() <= PARALLEL_COUNT {
         grid.fill(references)
@@ -153,18 +172,24 @@ pub(super) fn split<E: Extent>(
         // those before.
         let mut right_cost = [f64::INFINITY; MAX_BINS];
         let (mut bounds, mut count) = (E::EMPTY, 0u32);
-        for (bin, cost) in row[..bins].iter().zip(&mut right_cost).rev() {
-            bounds.grow(&bin.bounds);
-            count += bin.count;
-            if count > 0 {
-                *cost = bounds.half_area() * f64::from(count);
+        let mut cost = f64::INFINITY;
+        for (bin, right_cost) in row[..bins].iter().zip(&mut right_cost).rev() {
+            if bin.count > 0 {
+                bounds.grow(&bin.bounds);
+                count += bin.count;
+                cost = bounds.half_area() * f64::from(count);
             }
+            *right_cost = cost;
         }
         let (mut bounds, mut count) = (E::EMPTY, 0u32);
         for at in 1..bins {
+            // Behind an empty bin the boundary parts the same as before it.
+            if row[at - 1].count == 0 {
+                continue;
+            }
             bounds.grow(&row[at - 1].bounds);
             count += row[at - 1].count;
-            if count > 0 && (count as usize) < total {
+            if (count as usize) < total {
                 let cost = bounds.half_area() * f64::from(count) + right_cost[at];
                 best.improve(cost, axis, at, count as usize, total);
             }
@@ -172,14 +197,29 @@ pub(super) fn split<E: Extent>(
     }
     let found = best.is_some().then_some(best)?;
     let is_left =
-        |r: &Reference<E>| grid.bin(r.bounds.half_center().as_ref()[found.axis], found.axis) < found.position;
-    partition(references, is_left);
-    Some(found.left)
+        |center: &E::Orders<f32>| grid.bin(center.as_ref()[found.axis], found.axis) < found.position;
+    if total > PARALLEL_COUNT {
+        partition(references, |r| is_left(&r.bounds.half_center()));
+        return Some(found.left.into());
+    }
+    let mut centers = [Centers::empty(), Centers::empty()];
+    partition(references, |r| {
+        let center = r.bounds.half_center();
+        let is_left = is_left(&center);
+        centers[usize::from(!is_left)].add(&center);
+        is_left
+    });
+    let all = |bins: &[Bin<E>]| bins.iter().fold(E::EMPTY, |all, bin| all.union(&bin.bounds));
+    let (left, right) = filled[found.axis][..bins].split_at(found.position);
+    let [a, b] = centers;
+    let measured =
+        [(left, a), (right, b)].map(|(part, centers)| Some(Measured { bounds: all(part), centers }));
+    Some(Parts { left: found.left, measured })
 }
 
 /// Moves the references that are `is_left` to the front, in place. The order depends on the input
 /// order alone.
-fn partition<E>(references: &mut [Reference<E>], is_left: impl Fn(&Reference<E>) -> bool) {
+fn partition<E>(references: &mut [Reference<E>], mut is_left: impl FnMut(&Reference<E>) -> bool) {
     let (mut i, mut j) = (0, references.len());
     loop {
         while i < j && is_left(&references[i]) {

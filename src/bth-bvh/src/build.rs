@@ -1,6 +1,6 @@
 //! Top-down construction of the binary BVH.
 
-use super::binned_split::Centers;
+use super::binned_split::{Centers, Measured, Parts, measure};
 use super::bounds::Bounds;
 use super::extent::Extent;
 use super::split::Reference;
@@ -211,7 +211,7 @@ pub(super) fn split_with<E: Extent>(
 ) -> Result<BinaryBvh> {
     let mut nodes = super::zeroed(2 * references.len() - 1);
     let builder = Builder { effort, monitor };
-    builder.subtree(references, &mut nodes, Destination::ROOT, scratch)?;
+    builder.subtree(references, None, &mut nodes, Destination::ROOT, scratch)?;
     Ok(BinaryBvh { nodes, order: references.iter().map(|r| r.id).collect() })
 }
 
@@ -276,10 +276,11 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     /// Fills `nodes` (of length `2 * references.len() - 1`) with the subtree over the references,
-    /// in preorder.
+    /// in preorder. Measures them if they are not.
     fn subtree<E: Extent>(
         &self,
         references: &mut [Reference<E>],
+        measured: Option<Measured<E>>,
         nodes: &mut [Node],
         to: Destination,
         scratch: &mut sweep_split::Scratch<E>,
@@ -289,13 +290,14 @@ impl Builder<'_> {
         if task {
             self.monitor.check()?;
         }
-        let (bounds, centers) = binned_split::measure(references);
-        let Bounds { lower, upper } = bounds.node_box();
+        let Measured { bounds, centers } = measured.unwrap_or_else(|| measure(references));
+        let bounds = bounds.node_box();
+        let (lower, upper) = (bounds.lower(), bounds.upper());
         nodes[0] = Node { lower, upper, first: to.first, count: count as u32, right: 0 };
         if count == 1 {
             return Ok(());
         }
-        let left = self.split(references, &centers, to.level, scratch);
+        let Parts { left, measured: [a, b] } = self.split(references, &centers, to.level, scratch);
         let right = to.node + 2 * left as u32;
         nodes[0].right = right;
         let (left_references, right_references) = references.split_at_mut(left);
@@ -304,12 +306,12 @@ impl Builder<'_> {
         let left_to = Destination { node: to.node + 1, first: to.first, level };
         let right_to = Destination { node: right, first: to.first + left as u32, level };
         if !task {
-            self.subtree(left_references, left_nodes, left_to, scratch)?;
-            return self.subtree(right_references, right_nodes, right_to, scratch);
+            self.subtree(left_references, a, left_nodes, left_to, scratch)?;
+            return self.subtree(right_references, b, right_nodes, right_to, scratch);
         }
         let (a, b) = rayon::join(
-            || self.task(left_references, left_nodes, left_to),
-            || self.task(right_references, right_nodes, right_to),
+            || self.task(left_references, a, left_nodes, left_to),
+            || self.task(right_references, b, right_nodes, right_to),
         );
         a.and(b)
     }
@@ -318,42 +320,43 @@ impl Builder<'_> {
     fn task<E: Extent>(
         &self,
         references: &mut [Reference<E>],
+        measured: Option<Measured<E>>,
         nodes: &mut [Node],
         to: Destination,
     ) -> Result<()> {
-        self.subtree(references, nodes, to, &mut sweep_split::Scratch::default())?;
+        self.subtree(references, measured, nodes, to, &mut sweep_split::Scratch::default())?;
         if references.len() <= BUILD_TASK {
             self.monitor.advance(references.len() as u64);
         }
         Ok(())
     }
 
-    /// Partitions the references and returns the size of the left side, 1 to one less than all.
+    /// Partitions the references. The left part has 1 to one less than all.
     fn split<E: Extent>(
         &self,
         references: &mut [Reference<E>],
         centers: &Centers<E>,
         level: u32,
         scratch: &mut sweep_split::Scratch<E>,
-    ) -> usize {
+    ) -> Parts<E> {
         let count = references.len();
         if count == 2 {
-            return 1;
+            return 1.into();
         }
         // Halving needs ceil(log2(count)) levels. SAH may split as it likes while enough levels
         // remain for halving; else the node is halved.
         let halvings = usize::BITS - (count - 1).leading_zeros();
         if level + 1 + halvings > MAX_LEVELS {
-            return split_median(references, centers);
+            return split_median(references, centers).into();
         }
         if centers.coincide() {
-            return split_by_id(references);
+            return split_by_id(references).into();
         }
         if count <= self.effort.sweep_count {
-            return sweep_split::split(references, scratch);
+            return sweep_split::split(references, scratch).into();
         }
         binned_split::split(references, centers, self.effort.bins)
-            .unwrap_or_else(|| split_median(references, centers))
+            .unwrap_or_else(|| split_median(references, centers).into())
     }
 }
 

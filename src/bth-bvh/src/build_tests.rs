@@ -168,8 +168,8 @@ fn a_sweep_finds_the_best_split_and_bins_come_near() {
         let best = best_split_by_trial(&references);
         let left = sweep_split::split(&mut references, &mut sweep_split::Scratch::default());
         assert!((split_cost(&references, left) - best).abs() <= 1e-12 * best);
-        let (_, centers) = binned_split::measure(&references);
-        let left = binned_split::split(&mut references, &centers, 32).expect("separable");
+        let centers = measure(&references).centers;
+        let left = binned_split::split(&mut references, &centers, 32).expect("separable").left;
         let cost = split_cost(&references, left);
         assert!(cost >= best * (1.0 - 1e-12) && cost <= best * 1.1, "{cost} {best}");
     }

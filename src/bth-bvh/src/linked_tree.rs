@@ -202,7 +202,8 @@ impl<E: Extent> LinkedTree<E> {
     /// Writes a subtree into as many nodes and rows of the order as it takes.
     fn write(&self, at: u32, to: Place, counts: &[AtomicU32], nodes: &mut [Node], order: &mut [u32]) {
         let node = self.node(at);
-        let Bounds { lower, upper } = node.bounds.node_box();
+        let bounds = node.bounds.node_box();
+        let (lower, upper) = (bounds.lower(), bounds.upper());
         let Place { node: place, first } = to;
         nodes[0] = Node { lower, upper, first, count: order.len() as u32, right: 0 };
         if node.is_leaf() {

@@ -65,7 +65,7 @@ impl<const P: usize> Extent for PoseBounds<P> {
     /// A box of zeros: the boxes of nodes come from the mesh and are written when the tree is
     /// complete.
     fn node_box(&self) -> Bounds {
-        Bounds { lower: [0.0; 3], upper: [0.0; 3] }
+        Bounds::new([0.0; 3], [0.0; 3])
     }
 }
 
@@ -110,8 +110,8 @@ impl<'a, const P: usize> ScaledPoses<'a, P> {
             let Some(pose) = place else { continue };
             let box_of = pose.bounds(corners);
             for k in 0..3 {
-                bounds.lower[k][p] = box_of.lower[k];
-                bounds.upper[k][p] = box_of.upper[k];
+                bounds.lower[k][p] = box_of.lower()[k];
+                bounds.upper[k][p] = box_of.upper()[k];
             }
         }
         bounds
@@ -125,9 +125,10 @@ impl<'a> Scaled<'a> {
         let area = root.half_area();
         // Of boxes that are extremely thin the area stays below 1, so that no scaled coordinate
         // overflows.
-        let extent = (0..3).map(|k| f64::from(root.upper[k]) - f64::from(root.lower[k])).fold(0.0, f64::max);
+        let extent =
+            (0..3).map(|k| f64::from(root.upper()[k]) - f64::from(root.lower()[k])).fold(0.0, f64::max);
         let scale = if area > 0.0 { (1.0 / area.sqrt()).min(GREATEST / extent) } else { 0.0 };
-        Scaled { positions, origin: root.lower.map(f64::from), scale }
+        Scaled { positions, origin: root.lower().map(f64::from), scale }
     }
 
     fn bounds(&self, corners: [u32; 3]) -> Bounds {

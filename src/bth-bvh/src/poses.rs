@@ -124,6 +124,6 @@ pub(super) fn refit(mesh: &Mesh, bvh: &mut BinaryBvh) {
             let right = Bounds::of_node(&bvh.nodes[node.right as usize]);
             Bounds::of_node(&bvh.nodes[at + 1]).union(&right)
         };
-        (bvh.nodes[at].lower, bvh.nodes[at].upper) = (bounds.lower, bounds.upper);
+        (bvh.nodes[at].lower, bvh.nodes[at].upper) = (bounds.lower(), bounds.upper());
     }
 }

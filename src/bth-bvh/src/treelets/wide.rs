@@ -157,7 +157,8 @@ impl WideTree<'_> {
                 self.write(entries[node], to);
                 continue;
             };
-            let Bounds { lower, upper } = joined.bounds[node];
+            let bounds = joined.bounds[node];
+            let (lower, upper) = (bounds.lower(), bounds.upper());
             to.nodes.push(Node { lower, upper, first: to.order.len() as u32, count: 0, right: 0 });
             let [left, right] = joined.children[inner];
             stack.extend([(right, Some(at)), (left, None)]);

@@ -37,8 +37,8 @@ impl Parts {
         let used: Vec<u32> = ids.filter(|id| !mesh.has_zero_area(*id)).collect();
         let bounds = |id: &u32| Bounds::of_points(&mesh.corners(*id));
         let all = used.par_iter().map(bounds).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
-        let Bounds { lower, upper } = all;
-        let whole = Node { lower, upper, first: 0, count: used.len() as u32, right: 0 };
+        let (lower, upper, count) = (all.lower(), all.upper(), used.len() as u32);
+        let whole = Node { lower, upper, first: 0, count, right: 0 };
         let mut parts = Self { ids: Vec::new(), whole: (!used.is_empty()).then_some(whole) };
         if parts.whole.is_some() {
             let enough = |count: &usize| count.saturating_mul(most) >= used.len();
@@ -60,7 +60,7 @@ impl Parts {
         let center = |id: u32| Bounds::of_points(&mesh.corners(id)).half_center();
         let of_center = |id: &u32| Bounds::of_points(&[center(*id)]);
         let all = ids.par_iter().map(of_center).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
-        let extent = |k: usize| all.upper[k] - all.lower[k];
+        let extent = |k: usize| all.upper()[k] - all.lower()[k];
         let axis = (1..3).fold(0, |most, k| if extent(k) > extent(most) { k } else { most });
         let mut keyed: Vec<(f32, u32)> = ids.par_iter().map(|&id| (center(id)[axis], id)).collect();
         let middle = ids.len() / 2;

@@ -17,7 +17,8 @@ use bth_import::{ImageFile, Mesh, import_bytes, import_images_bytes, import_tria
 use std::path::Path;
 
 /// Compiles a mesh as [`compile`](super::compile) does with [`CompileOptions::fast`]: the same
-/// bytes. `deformable` keeps what new positions at run time need.
+/// bytes, but for meshes of more than 2²⁴ triangles, which are built at once here. `deformable`
+/// keeps what new positions at run time need.
 ///
 /// # Errors
 /// The errors of [`compile`](super::compile).

@@ -134,16 +134,16 @@ pub(super) fn measure<E: Extent>(references: &[Reference<E>]) -> Measured<E> {
 }
 
 /// Two parts of triangles.
-pub(super) struct Parts<E: Extent> {
+pub(super) struct Sides<E: Extent> {
     /// Triangles of the left one.
     pub(super) left: usize,
     /// Both, where they are measured already.
     pub(super) measured: [Option<Measured<E>>; 2],
 }
 
-impl<E: Extent> From<usize> for Parts<E> {
+impl<E: Extent> From<usize> for Sides<E> {
     fn from(left: usize) -> Self {
-        Parts { left, measured: [None, None] }
+        Sides { left, measured: [None, None] }
     }
 }
 
@@ -155,7 +155,7 @@ pub(super) fn split<E: Extent>(
     references: &mut [Reference<E>],
     centers: &Centers<E>,
     bins: usize,
-) -> Option<Parts<E>> {
+) -> Option<Sides<E>> {
     let grid = Grid::new(centers, bins);
     let filled = if references.len() <= PARALLEL_COUNT {
         grid.fill(references)
@@ -214,7 +214,7 @@ pub(super) fn split<E: Extent>(
     let [a, b] = centers;
     let measured =
         [(left, a), (right, b)].map(|(part, centers)| Some(Measured { bounds: all(part), centers }));
-    Some(Parts { left: found.left, measured })
+    Some(Sides { left: found.left, measured })
 }
 
 /// Moves the references that are `is_left` to the front, in place. The order depends on the input

@@ -1,6 +1,6 @@
 //! Top-down construction of the binary BVH.
 
-use super::binned_split::{Centers, Measured, Parts, measure};
+use super::binned_split::{Centers, Measured, Sides, measure};
 use super::bounds::Bounds;
 use super::extent::Extent;
 use super::split::Reference;
@@ -297,7 +297,7 @@ impl Builder<'_> {
         if count == 1 {
             return Ok(());
         }
-        let Parts { left, measured: [a, b] } = self.split(references, &centers, to.level, scratch);
+        let Sides { left, measured: [a, b] } = self.split(references, &centers, to.level, scratch);
         let right = to.node + 2 * left as u32;
         nodes[0].right = right;
         let (left_references, right_references) = references.split_at_mut(left);
@@ -338,7 +338,7 @@ impl Builder<'_> {
         centers: &Centers<E>,
         level: u32,
         scratch: &mut sweep_split::Scratch<E>,
-    ) -> Parts<E> {
+    ) -> Sides<E> {
         let count = references.len();
         if count == 2 {
             return 1.into();

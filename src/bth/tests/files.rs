@@ -11,7 +11,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 29] = files![
+const VALID: [(&str, &[u8]); 31] = files![
     "deformable",
     "deformers",
     "free-directions",
@@ -28,6 +28,8 @@ const VALID: [(&str, &[u8]); 29] = files![
     "scene-groups",
     "scene-moving",
     "scene-still",
+    "scene-trees",
+    "scene-trees-of-groups",
     "second-uvs",
     "sequence",
     "tets-link32",

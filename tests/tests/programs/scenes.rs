@@ -326,7 +326,7 @@ fn manifests_are_written_beside_or_above_their_model_only() {
     assert!(text.contains("model = \"a/x.glb\""), "{text}");
     run("bthc", folder.path(), &["compile", "up.manifest", "--quiet"]).expect(0);
     let below = run("bthc", folder.path(), &["import", "a/x.glb", "-o", "a/b/down.manifest"]).expect(2);
-    assert!(below.stderr.contains("beside the glTF file or in a folder above"), "{below:?}");
+    assert!(below.stderr.contains("beside that file or in a folder above"), "{below:?}");
     run("bthc", folder.path(), &["compile", "a/x.glb", "-o", "flat.bth", "--flatten", "--json"]).expect(0);
     let info = run("bthc", folder.path(), &["info", "flat.bth", "--json"]).expect(0).json();
     assert!(info["scene"].is_null());

@@ -21,7 +21,9 @@ pub(super) fn name(head: &[u8]) -> Digest {
 /// The name of a compiled file's content, if every byte of the file agrees with the hashes; else
 /// `None`.
 pub fn name_if_whole(path: &Path) -> Option<Digest> {
-    let table = bth_format::file::read_table(path).ok()?;
+    let mut table = bth_format::file::read_table(path).ok()?;
+    // OBJECT sections lie before all others.
+    table.sort_unstable_by_key(|entry| entry.offset);
     let mut file = std::fs::File::open(path).ok()?;
     let length = file.metadata().ok()?.len();
     let mut head = [0; HEADER];

@@ -126,12 +126,16 @@ def test_names(kept, bare):
 
 
 def test_without_geometry(path, aimed):
+    whole = bth.compile(path, names=True)
     scene = bth.compile(path, geometry=False, names=True)
-    hits = scene.nearest(*aimed)
+    hits, of_whole = scene.nearest(*aimed), whole.nearest(*aimed)
     assert hits.group_name[0] == PARTS[3][hits.triangle[0]][0]
-    for query in (lambda: hits.normal, hits.surface, lambda: hits.texcoord, scene.vertices, lambda: scene.triangle_positions(0, 0)):
-        with pytest.raises(LookupError, match="geometry"):
-            query()
+    # The corners of triangles are read from their leaves.
+    np.testing.assert_array_equal(hits.normal, of_whole.normal)
+    np.testing.assert_array_equal(hits.surface().position, of_whole.surface().position)
+    np.testing.assert_array_equal(scene.triangle_positions(0, 0), whole.triangle_positions(0, 0))
+    with pytest.raises(LookupError, match="geometry"):
+        scene.vertices()
 
 
 def test_triangles_that_do_not_exist(kept):

@@ -91,7 +91,8 @@ impl<'a> ShadingGeometry<'a> {
     /// The unit normal of a triangle's plane in the world on the side of its front; `None` where it
     /// cannot be computed.
     fn front_normal(&self, primitive: PrimitiveRef) -> Option<DVec3> {
-        let [a, b, c] = self.scene.triangle(primitive)?.map(DVec3::from_array);
+        let object = self.object_of(primitive.instance);
+        let [a, b, c] = self.scene.triangle_of(object, primitive.triangle)?.map(DVec3::from_array);
         let (e, f) = (b - a, c - a);
         // Scaled first: the square of the cross product of two edges of 1e-20 underflows in f64.
         let scale = e.abs().max_element().max(f.abs().max_element());

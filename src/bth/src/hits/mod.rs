@@ -251,7 +251,15 @@ impl Scene {
     /// leaf: they are read from the source, and are `None` with `--no-geometry`. `None` if there is
     /// no such instance or triangle.
     pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
-        corners_by_id(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
+        self.triangle_of(surface::object_at(self, primitive)?, primitive.triangle)
+    }
+
+    /// The vertices of a triangle of an object, as [`Self::triangle`] has them for its instances.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn triangle_of(&self, object: u32, triangle: u32) -> Option<[[f64; 3]; 3]> {
+        corners_by_id(self.view(object), triangle)
     }
 
     /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they

@@ -11,7 +11,7 @@ use crate::surface::object_at;
 use bth_format::layout::{CacheLine, Child};
 use bth_format::object::ObjectView;
 
-/// Bytes of nodes and leaves that are read at a time. Half as much and twice as much took longer.
+/// Bytes of nodes and leaves that are read at a time. With half as much pictures took longer.
 const BLOCK: usize = 64 << 10;
 /// Rows of triangles that are read at a time: the leaves of a block have about 3,000.
 const ROWS: usize = 4096;

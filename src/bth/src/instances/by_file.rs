@@ -38,7 +38,7 @@ impl World {
     /// sections. `None` if the file has no trees.
     ///
     /// # Errors
-    /// Those of [`Self::update`].
+    /// Errors of [`Self::update`].
     pub(crate) fn with_trees(objects: &Objects) -> Result<Option<World>> {
         let Some(file) = objects.sole_file() else { return Ok(None) };
         let (Some(view), Some(stored)) = (file.scene(), StoredRows::of(file)) else { return Ok(None) };
@@ -90,7 +90,7 @@ impl World {
     /// The instances of a file at a time. Its scene has been checked.
     ///
     /// # Errors
-    /// Those of [`Self::update`].
+    /// Errors of [`Self::update`].
     fn placed_at(objects: &Objects, view: &SceneView<'_>, seconds: f64) -> Result<World> {
         let file = objects.sole_file().expect("a file with a scene");
         let source = TransformSource::File(NodeHierarchy::new(view, 0));

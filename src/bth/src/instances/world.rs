@@ -387,7 +387,9 @@ impl World {
             return groups.find(instance).object;
         }
         match &self.source {
-            TransformSource::File(_) => scene_of(objects).instances[instance as usize].object,
+            TransformSource::File(_) => {
+                objects.sole_file().expect("a file with a scene").instances()[instance as usize].object
+            }
             TransformSource::Caller(caller) => caller.rows[instance as usize].row.object,
         }
     }

@@ -79,7 +79,7 @@ pub(crate) struct Import {
 /// its animations, and what a scene skips.
 #[derive(Debug, Group)]
 pub(crate) struct Info {
-    /// The compiled file, or a model: OBJ, PLY, STL, OFF, glTF, GLB.
+    /// The compiled file, or a model: OBJ, PLY, STL, OFF, glTF, GLB, FBX.
     #[arg(required_unless_present = "cpu")]
     pub(crate) file: Option<PathBuf>,
     /// Show the processor's features that tracing may use.

@@ -144,7 +144,7 @@ pub(crate) fn compile_path(
     }
     let bytes = monitored(py, &keywords, |monitor| {
         let content = compile_file(&path, flatten, &gltf, &options, store.as_ref(), monitor)?;
-        deliver(&content, output.as_deref())
+        deliver(content, output.as_deref())
     })?;
     let scene = py.detach(|| bth::from_bytes(&bytes));
     scene.map(NativeScene::new).map_err(|e| format_error(&e))
@@ -184,7 +184,7 @@ pub(crate) fn compile_mesh(
         let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "mesh"));
         let compiled = bth_compile::pipeline::compile_cached(mesh, &options, &cache, &|_| true, monitor)?;
         let content = compiled.content.ok_or_else(no_content)?;
-        deliver(&content, output.as_deref()).map(|bytes| bth::from_bytes(&bytes))
+        deliver(content, output.as_deref()).map(|bytes| bth::from_bytes(&bytes))
     })?;
     opened.map(NativeScene::new).map_err(|e| format_error(&e))
 }
@@ -194,11 +194,12 @@ fn no_content() -> bth_compile::Error {
 }
 
 /// The bytes of a compiled file, which are also written to `output`.
-fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Result<Vec<u8>> {
+fn deliver(content: write::Content, output: Option<&Path>) -> bth_compile::Result<Vec<u8>> {
+    let bytes = content.bytes()?.into_owned();
     if let Some(output) = output {
         write::write_content(output, content)?;
     }
-    Ok(content.bytes()?.into_owned())
+    Ok(bytes)
 }
 
 /// Compiles a scene: pairs of positions and triangles, for each instance its mesh and the 3×4
@@ -230,7 +231,7 @@ pub(crate) fn compile_scene(
         let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "scene"));
         let names = SceneNames { meshes: names.0.as_deref(), instances: names.1.as_deref() };
         let compiled = memory::compile_named_scene(&meshes, &instances, names, &options, &cache, monitor)?;
-        deliver(&compiled.content.ok_or_else(no_content)?, output.as_deref())
+        deliver(compiled.content.ok_or_else(no_content)?, output.as_deref())
     })?;
     let scene = py.detach(|| bth::from_bytes(&bytes));
     scene.map(NativeScene::new).map_err(|e| format_error(&e))

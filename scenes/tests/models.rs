@@ -127,6 +127,32 @@ fn writers_keep_every_bit_of_the_positions() {
     assert_eq!(ply.len() - header, 12 * 1_440 + 13 * 2_880);
 }
 
+/// Each triangle of a strip is one corner and the two before it, the odd ones turned.
+#[test]
+fn strips_hold_the_same_triangles_in_less_than_half_the_bytes() {
+    for (name, faces) in [("blob", 80_000), ("torus-knot", 2_880), ("soup", 50)] {
+        let model = make(name, faces);
+        let bytes = write::ply_of_strips(&model);
+        let header = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+        let corners = &bytes[header + 12 * model.positions.len() + 4..];
+        let corners: Vec<i32> =
+            corners.chunks_exact(4).map(|b| i32::from_le_bytes(b.try_into().unwrap())).collect();
+        let turned = |t: [i32; 3]| {
+            let first = (0..3).min_by_key(|&k| t[k]).unwrap();
+            [0, 1, 2].map(|k| t[(first + k) % 3] as u32)
+        };
+        let strips = corners.split(|&v| v == -1).flat_map(|strip| {
+            let corners = strip.windows(3).enumerate();
+            corners.map(|(k, t)| if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] })
+        });
+        let expected: Vec<_> = model.triangles.iter().map(|t| turned(t.map(|v| v as i32))).collect();
+        assert_eq!(strips.map(turned).collect::<Vec<_>>(), expected, "{name}");
+        if name == "blob" {
+            assert!(4 * corners.len() < 13 * expected.len() / 2);
+        }
+    }
+}
+
 #[test]
 fn files_are_written_by_extension_and_others_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,6 +13,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Bytes of objects that are kept in memory.
 const MEMORY: u64 = 64 << 20;
+/// Bytes of a file without a name. A scene may need many of them: each is gone when the last of its
+/// sections has been written.
+const SPOOL: u64 = 1 << 30;
 /// Bytes of meshes that are kept in memory until they are compiled.
 const MESHES: u64 = 256 << 20;
 /// Objects of this size in the cache are copied from there, not read into memory.
@@ -36,6 +39,8 @@ struct Held {
     meshes: u64,
     pinned: usize,
     spool: Option<Arc<DiskFile>>,
+    /// Bytes that the current file without a name has.
+    spooled: u64,
 }
 
 impl Keeper {
@@ -102,11 +107,13 @@ impl Keeper {
             state.bytes += bytes;
             return None;
         };
-        if state.spool.is_none() {
+        if state.spool.is_none() || state.spooled >= SPOOL {
             // Where no file can be made, memory has to do.
             let file = bth_files::nameless(folder).ok()?;
             state.spool = Some(Arc::new(DiskFile::open(folder, file)));
+            state.spooled = 0;
         }
+        state.spooled += bytes;
         state.spool.clone()
     }
 

@@ -13,13 +13,14 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     bth_files::replace(path, |out| out.write_all(bytes)).map_err(|e| cannot(path, &e))
 }
 
-/// Writes a content as [`write_atomically`] does.
+/// Writes a content as [`write_atomically`] does. What was kept in temporary files is removed part
+/// by part, so that a large file does not need room twice.
 ///
 /// # Errors
 /// The errors of [`write_atomically`]; for files that are copied into it `BTH-O001` when they
 /// cannot be read and `BTH-O002` when they have changed.
-pub fn write_content(path: &Path, content: &Content) -> Result<()> {
-    bth_files::replace(path, |out| content.write_to(out))
+pub fn write_content(path: &Path, content: Content) -> Result<()> {
+    bth_files::replace(path, |out| content.write_last(out))
         .map_err(|e| unread(&e).unwrap_or_else(|| cannot(path, &e)))
 }
 

@@ -153,25 +153,36 @@ impl<'a> FileBuilder<'a> {
             bytes.extend_from_slice(piece);
             Ok(())
         };
-        self.write_to(take).expect("sections in memory can be read");
+        self.borrowed().write_to(take).expect("sections in memory can be read");
         bytes
     }
 
-    /// Passes on the bytes of the file, in pieces. Sections on disk are read.
+    /// Passes on the bytes of the file, in pieces. Sections on disk are read. Each section is
+    /// dropped behind its bytes, so that a temporary file whose sections are all written takes no
+    /// room any more.
     ///
     /// # Errors
     /// Errors of `take`, and of files that cannot be read again or have changed.
-    pub(crate) fn write_to(&self, take: &mut dyn FnMut(&[u8]) -> std::io::Result<()>) -> std::io::Result<()> {
+    pub(crate) fn write_to(self, take: &mut dyn FnMut(&[u8]) -> std::io::Result<()>) -> std::io::Result<()> {
         let entries = self.entries();
         take(self.header(&entries).as_bytes())?;
         take(entries.as_bytes())?;
         let mut end = self.table_end();
-        for (entry, section) in self.in_place(&entries) {
+        for (entry, section) in in_place(&entries, self.sections.into_values()) {
             take(&[0; ALIGNMENT][..(entry.offset - end) as usize])?;
             section.bytes.read(section.hash, take)?;
             end = entry.offset + entry.length;
         }
         take(&[0; ALIGNMENT][..(end.next_multiple_of(ALIGNMENT as u64) - end) as usize])
+    }
+
+    /// The same sections, borrowed.
+    pub(crate) fn borrowed(&self) -> FileBuilder<'_> {
+        let sections = self.sections.iter().map(|(key, section)| {
+            let &Section { flags, stride, hash, ref bytes } = section;
+            (*key, Section { flags, stride, hash, bytes: bytes.borrowed() })
+        });
+        FileBuilder { sections: sections.collect(), required_features: self.required_features }
     }
 
     /// Writes header, table and sections on disk into as many zero bytes as the file has. Returns
@@ -189,7 +200,7 @@ impl<'a> FileBuilder<'a> {
         front.copy_from_slice(&head);
         let mut end = head.len();
         let mut copies = Vec::with_capacity(entries.len());
-        for (entry, section) in self.in_place(&entries) {
+        for (entry, section) in in_place(&entries, self.sections.values()) {
             let (_, section_and_rest) = rest.split_at_mut(entry.offset as usize - end);
             let (to, behind) = section_and_rest.split_at_mut(entry.length as usize);
             match section.bytes.in_memory() {
@@ -272,18 +283,6 @@ impl<'a> FileBuilder<'a> {
         (size_of::<Header>() + self.sections.len() * size_of::<SectionEntry>()) as u64
     }
 
-    /// The sections in the order in which they lie in the file.
-    fn in_place<'e>(
-        &self,
-        entries: &'e [SectionEntry],
-    ) -> impl Iterator<Item = (&'e SectionEntry, &Section<'a>)> {
-        let all = |first: bool| {
-            let sections = entries.iter().zip(self.sections.values());
-            sections.filter(move |(entry, _)| (entry.kind == kind::OBJECT) == first)
-        };
-        all(true).chain(all(false))
-    }
-
     fn entries(&self) -> Vec<SectionEntry> {
         // OBJECT sections come first, so that what a reader needs of many objects is in one place.
         let of_objects = self.sections.iter().filter(|((_, kind), _)| *kind == kind::OBJECT);
@@ -310,6 +309,16 @@ impl<'a> FileBuilder<'a> {
         };
         self.sections.iter().map(entry).collect()
     }
+}
+
+/// Sections with their entries, in the order in which they lie in the file.
+fn in_place<S>(
+    entries: &[SectionEntry],
+    sections: impl Iterator<Item = S>,
+) -> impl Iterator<Item = (&SectionEntry, S)> {
+    let (first, others): (Vec<_>, Vec<_>) =
+        entries.iter().zip(sections).partition(|(entry, _)| entry.kind == kind::OBJECT);
+    first.into_iter().chain(others)
 }
 
 /// Table entry of a section whose bytes have been hashed before.
@@ -354,6 +363,29 @@ mod tests {
         a.provenance("{}".into()).unwrap();
         assert_eq!(id, a.content_id());
         assert_ne!(a.finish(), b.finish());
+    }
+
+    #[test]
+    fn a_temporary_file_is_gone_when_its_sections_are_written() {
+        let mut builder = FileBuilder::new();
+        let mut files = Vec::new();
+        for (kind, byte) in [(100, b'a'), (101, b'b')] {
+            let file = Arc::new(DiskFile::open("temporary".as_ref(), tempfile::tempfile().unwrap()));
+            let range = file.append(&[byte; 100]).unwrap();
+            let head = SectionHead { kind, object: 0, stride: 1, hash: hash128(&[byte; 100]) };
+            files.push(Arc::downgrade(&file));
+            builder.hashed_section(head, None, Bytes::OnDisk(file, range)).unwrap();
+        }
+        let (whole, mut written) = (builder.finish(), Vec::new());
+        let take = &mut |piece: &[u8]| {
+            let left = [0, 1].map(|file: usize| files[file].strong_count() > 0);
+            assert!(!piece.starts_with(b"a") || left == [true, true]);
+            assert!(!piece.starts_with(b"b") || left == [false, true]);
+            written.extend_from_slice(piece);
+            Ok(())
+        };
+        builder.write_to(take).unwrap();
+        assert_eq!(written, whole);
     }
 
     #[test]

@@ -46,6 +46,15 @@ impl Bytes<'_> {
         }
     }
 
+    /// The same, borrowed.
+    pub(super) fn borrowed(&self) -> Bytes<'_> {
+        match self {
+            Self::Owned(bytes) => Bytes::Owned(Cow::Borrowed(bytes)),
+            Self::InFile(file, range) => Bytes::InFile(file.clone(), range.clone()),
+            Self::OnDisk(file, range) => Bytes::OnDisk(file.clone(), range.clone()),
+        }
+    }
+
     /// The same without a borrow.
     pub(super) fn into_static(self) -> Bytes<'static> {
         match self {

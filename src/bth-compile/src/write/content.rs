@@ -72,7 +72,18 @@ impl Content {
         match &self.0 {
             Parts::Bytes(bytes) => out.write_all(bytes),
             Parts::File(file) => out.write_all(file.bytes()),
+            Parts::Sections { builder, .. } => builder.borrowed().write_to(&mut |bytes| out.write_all(bytes)),
+        }
+    }
+
+    /// Writes the content for the last time, and removes parts of temporary files behind it.
+    ///
+    /// # Errors
+    /// The errors of [`Self::write_to`].
+    pub(crate) fn write_last(self, out: &mut (impl Write + ?Sized)) -> Result<()> {
+        match self.0 {
             Parts::Sections { builder, .. } => builder.write_to(&mut |bytes| out.write_all(bytes)),
+            _ => self.write_to(out),
         }
     }
 

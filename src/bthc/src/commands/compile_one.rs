@@ -40,14 +40,14 @@ fn compile_job(context: &JobContext<'_>, job: &Job, monitor: &dyn Monitor) -> Re
     }
     let cache = cache(context, job);
     let needed = |record: &_| job.target.needs(record, context.store.as_ref());
-    let outcome =
+    let mut outcome =
         bth_compile::pipeline::compile_cached(&job.model, &context.options, &cache, &needed, monitor)?;
     let files = || {
         let mut files = bth_compile::source::files(&job.model, context.options.looks())?;
         files.extend(context.args.selection.rays.clone());
         Ok(files)
     };
-    let mut report = deliver::deliver(context, job, &outcome, &cache, &files)?;
+    let mut report = deliver::deliver(context, job, &mut outcome, &cache, &files)?;
     report.json["report"] = outcome.report;
     if let Some(built) = &outcome.built {
         let known_rays = context.options.costs.rays.as_ref().map_or(0, |rays| rays.count() as u64);

@@ -23,12 +23,14 @@ use std::time::{Instant, SystemTime};
 pub(super) fn deliver<R>(
     context: &JobContext<'_>,
     job: &Job,
-    outcome: &CachedCompilation<R>,
+    outcome: &mut CachedCompilation<R>,
     cache: &Cache<'_>,
     inputs: &dyn Fn() -> bth_compile::Result<Vec<PathBuf>>,
 ) -> Result<JobReport, Failure> {
     let start = Instant::now();
-    match (&job.target, &outcome.content) {
+    let content = outcome.content.take();
+    let (written, length) = (content.is_some(), content.as_ref().map(Content::length));
+    match (&job.target, content) {
         (Target::File(path), Some(content)) => {
             write::write_content(path, content)?;
             if let (Some(store), Some(record)) = (&context.store, &outcome.record) {
@@ -58,12 +60,12 @@ pub(super) fn deliver<R>(
             &"the compiled file could not be kept",
         ));
     }
-    let (from, wrote) = match (&outcome.built, &outcome.content) {
+    let (from, wrote) = match (&outcome.built, written) {
         (Some(_), _) => ("compiled", "wrote"),
-        (None, Some(_)) => ("from the cache", "wrote"),
-        (None, None) => ("unchanged", "up to date:"),
+        (None, true) => ("from the cache", "wrote"),
+        (None, false) => ("unchanged", "up to date:"),
     };
-    let size = outcome.record.as_ref().map(|r| r.bytes).or(outcome.content.as_ref().map(Content::length));
+    let size = outcome.record.as_ref().map(|r| r.bytes).or(length);
     let name = job.target.name();
     let key = outcome.record.as_ref().map(|r| r.key.id());
     let log = cache.log();
@@ -76,13 +78,13 @@ pub(super) fn deliver<R>(
         "misses": log.misses,
         "entry": kept.map(|(record, store)| store.path(record).to_string_lossy().into_owned()),
     });
-    let took = if outcome.content.is_some() { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
+    let took = if written { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
     let mut text = if outcome.built.is_none() { format!("{from}\n") } else { String::new() };
     text.push_str(&format!("{wrote} {name}\n"));
     let mut json = json!({
         "model": job.name(),
         "output": name,
-        "written": outcome.content.is_some(),
+        "written": written,
         "cache": state,
     });
     if job.target == Target::Cache {

@@ -75,8 +75,8 @@ pub(super) fn compile(
         whole: job.target == Target::Cache,
         needed: &|record| job.target.needs(record, context.store.as_ref()),
     };
-    let outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
-    let mut report = deliver(context, job, &outcome, &cache, &|| {
+    let mut outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
+    let mut report = deliver(context, job, &mut outcome, &cache, &|| {
         let mut files = files(&manifest, &job.model, context.options.looks())?;
         files.extend(context.args.selection.rays.clone());
         Ok(files)

@@ -244,13 +244,12 @@ impl Gathered {
         if base + vertices.count > limit {
             return operation(too_many);
         }
-        let positions = &mut self.positions;
+        let Gathered { positions, triangles: corners, .. } = self;
         positions.reserve(vertices.count);
         for row in 0..vertices.count {
             // SAFETY: the row exists, and vertices are three floats.
             positions.push(unsafe { vertices.floats::<3>(row) });
         }
-        let mut corners = Vec::new();
         let layout = match geometry.kind {
             TRIANGLE => {
                 corners.reserve(items.count);
@@ -274,7 +273,7 @@ impl Gathered {
                     // SAFETY: the row exists, and grids are three words.
                     let [start, stride, size] = unsafe { items.words::<3>(row) };
                     let (width, height) = (size & 0xFFFF, size >> 16);
-                    rows.push(GridRow { first: corners.len() as u32, width, height });
+                    rows.push(GridRow { first: (corners.len() - first) as u32, width, height });
                     for y in 0..height.saturating_sub(1) {
                         for x in 0..width.saturating_sub(1) {
                             let at = |x: u32, y: u32| {
@@ -284,34 +283,35 @@ impl Gathered {
                             corners.extend(halves(quad, vertices.count, positions, base));
                         }
                     }
-                    if first + corners.len() > limit {
+                    if corners.len() > limit {
                         return operation(too_many);
                     }
                 }
                 Layout::Grids(rows)
             }
         };
-        if first + corners.len() > limit {
+        if corners.len() > limit {
             return operation(too_many);
         }
         let positions = &positions[base..];
-        // What cannot be hit keeps its number, as a triangle without area at a usable vertex.
-        self.triangles.resize(first + corners.len(), [u32::MAX; 3]);
-        self.normals.resize(first + corners.len(), [0.0; 3]);
-        let triangles = self.triangles[first..].par_chunks_mut(CHUNK);
-        let rows = corners.par_chunks(CHUNK).zip(triangles.zip(self.normals[first..].par_chunks_mut(CHUNK)));
+        self.normals.resize(corners.len(), [0.0; 3]);
+        let rows = corners[first..].par_chunks_mut(CHUNK).zip(self.normals[first..].par_chunks_mut(CHUNK));
         let join = |mut a: Bounds, b: Bounds| {
             a.join(&b);
             a
         };
-        let bounds = rows.map(|(rows, (triangles, normals))| {
+        let bounds = rows.map(|(triangles, normals)| {
             let mut bounds = Bounds::EMPTY;
-            for ((row, triangle), of_triangle) in rows.iter().zip(triangles).zip(normals) {
-                if let Some(points) = usable(*row, positions) {
-                    points.iter().for_each(|point| bounds.add(*point));
-                    *triangle = row.map(|row| row + base as u32);
-                    *of_triangle = normal(points);
-                }
+            for (triangle, of_triangle) in triangles.iter_mut().zip(normals) {
+                // What cannot be hit keeps its number, as a triangle without area.
+                *triangle = match usable(*triangle, positions) {
+                    Some(points) => {
+                        points.iter().for_each(|point| bounds.add(*point));
+                        *of_triangle = normal(points);
+                        triangle.map(|row| row + base as u32)
+                    }
+                    None => [u32::MAX; 3],
+                };
             }
             bounds
         });

@@ -28,7 +28,7 @@ def compile(
 ):
     """Compiles a model and returns its scene.
 
-    model: a path (OBJ, PLY, STL, OFF, glTF, GLB, scene manifest), a pair (vertices, faces), a mesh of trimesh, meshio, pyvista or Open3D,
+    model: a path (OBJ, PLY, STL, OFF, glTF, GLB, FBX, 3MF, scene manifest), a pair (vertices, faces), a mesh of trimesh, meshio, pyvista or Open3D,
     or a scene of trimesh.
     output: also writes the compiled file to this path.
     cache: True, False or a folder; by default files go through the cache as those of the program, and arrays do not. cache_size and

@@ -3,6 +3,7 @@
 use crate::options::Keywords;
 use bth_cache::Store;
 use bth_compile::cached::Cache;
+use bth_compile::error::for_callers;
 use pyo3::exceptions::{PyOSError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use std::ffi::CString;
@@ -78,7 +79,7 @@ pub(crate) fn store(keywords: &Keywords<'_, '_>, default: bool) -> PyResult<Opti
 
 /// Warns the caller, which fails where warnings are errors.
 pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
-    let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
+    let text = CString::new(for_callers(message).replace('\0', " ")).unwrap_or_default();
     // The frame of the package is 1, the frame of its caller 2.
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)
 }

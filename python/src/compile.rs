@@ -284,7 +284,7 @@ fn is_scene(path: &Path, flatten: bool) -> bool {
     has_extension(path, &["manifest", "toml"]) || bth_import::is_scene(path) && !flatten
 }
 
-/// Compiles a file as the program does: glTF and FBX files and manifests are scenes.
+/// Compiles a file as the program does: glTF, FBX and 3MF files and manifests are scenes.
 fn compile_file(
     path: &Path,
     flatten: bool,

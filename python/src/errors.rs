@@ -1,5 +1,6 @@
 //! Exceptions.
 
+use bth_compile::error::for_callers;
 use pyo3::create_exception;
 use pyo3::exceptions::{
     PyIndexError, PyKeyboardInterrupt, PyLookupError, PyOSError, PyRuntimeError, PyValueError,
@@ -16,7 +17,7 @@ create_exception!(
 
 /// An exception with a code.
 fn coded(code: &str, message: String) -> PyErr {
-    let error = Error::new_err(message);
+    let error = Error::new_err(for_callers(&message));
     Python::attach(|py| {
         // Without the attribute the message still has the code.
         let _ = error.value(py).setattr("code", code);
@@ -54,7 +55,7 @@ pub(crate) fn write_error(path: &Path, error: &std::io::Error) -> PyErr {
 /// The exception for an error of the compiler.
 pub(crate) fn compile_error(error: bth_compile::Error) -> PyErr {
     use bth_compile::Error as Failure;
-    let text = error.to_string();
+    let text = for_callers(&error.to_string());
     match error {
         Failure::Input { code, .. } | Failure::Limit { code, .. } => coded(code, text),
         Failure::File { .. } => PyOSError::new_err(text),

@@ -4,6 +4,7 @@
 //! Nothing is freed: the caller compiles one mesh and drops the module's instance with its memory.
 #![allow(unsafe_code)] // All functions are called from outside and take addresses.
 
+use bth_compile::error::for_callers;
 use bth_compile::memory::{PositionRows, TriangleMesh};
 use bth_compile::pipeline::{Compiled, compile_fast};
 use bth_compile::{Monitor, Result};
@@ -21,7 +22,7 @@ struct Warnings;
 impl Monitor for Warnings {
     fn warn(&self, message: &str) {
         if let Ok(mut warnings) = WARNINGS.lock() {
-            *warnings = format!("{warnings}{message}\n");
+            *warnings = format!("{warnings}{}\n", for_callers(message));
         }
     }
 }
@@ -83,7 +84,7 @@ pub unsafe extern "C" fn bth_compile_model(
 fn keep(made: Result<Compiled>) -> f64 {
     let (bytes, sign) = match made {
         Ok(compiled) => (compiled.bytes, 1.0),
-        Err(error) => (error.to_string().into_bytes(), -1.0),
+        Err(error) => (for_callers(&error.to_string()).into_bytes(), -1.0),
     };
     let length = bytes.len() as f64;
     if let Ok(mut kept) = BYTES.lock() {

@@ -9,6 +9,7 @@ mod rounding;
 
 use bth_cache::{DEFAULT_CAP, Store};
 use compiler::cached::Cache;
+use compiler::error::for_callers;
 use compiler::memory::{self, Instance, PositionRows, TriangleMesh};
 use compiler::pipeline::{self, CompileOptions, Structure};
 use compiler::write::Content;
@@ -55,7 +56,7 @@ impl From<Error> for Failure {
             Error::Internal { .. } => ERROR_INTERNAL,
             Error::Cancelled => ERROR_CANCELLED,
         };
-        Failure(code, error.to_string())
+        Failure(code, for_callers(&error.to_string()))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::options::{Options, Progress, Warning};
 use compiler::Monitor;
+use compiler::error::for_callers;
 use std::ffi::{CString, c_void};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, TryLockError};
@@ -96,7 +97,7 @@ impl Monitor for Callbacks {
     fn warn(&self, message: &str) {
         let Some(warning) = self.warning else { return };
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let message = CString::new(message.replace('\0', "?")).unwrap_or_default();
+        let message = CString::new(for_callers(message).replace('\0', "?")).unwrap_or_default();
         // SAFETY: the caller gave a function of this type; the message lives until it returns.
         unsafe { warning(state.user, message.as_ptr()) };
     }

@@ -119,6 +119,26 @@ impl From<&Error> for bth_files::Diagnosis {
     }
 }
 
+/// The text of an error or a warning for callers of a library: it names options of `bthc` as
+/// arguments, `max_error` for `--max-error`.
+pub fn for_callers(text: &str) -> String {
+    // Paths come before the code, and stay as they are.
+    let (place, message) = text.split_at(text.find("BTH-").unwrap_or(0));
+    let mut parts = message.split("--");
+    let mut changed = format!("{place}{}", parts.next().unwrap_or_default());
+    for part in parts {
+        if part.starts_with(|c: char| c.is_ascii_lowercase()) && changed.ends_with([' ', '(']) {
+            let end = part.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(part.len());
+            changed.push_str(&part[..end].replace('-', "_"));
+            changed.push_str(&part[end..]);
+        } else {
+            changed.push_str("--");
+            changed.push_str(part);
+        }
+    }
+    changed
+}
+
 /// The hint for a file that cannot be read or written.
 fn file_hint(code: &str) -> &'static str {
     match code {
@@ -160,6 +180,14 @@ fn hint_text(hint: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn callers_read_of_arguments() {
+        let text = "a --b-c.obj: BTH-I080: no (hint: use --structure bth, or --max-error; -- x--y --9)";
+        let expected = "a --b-c.obj: BTH-I080: no (hint: use structure bth, or max_error; -- x--y --9)";
+        assert_eq!(for_callers(text), expected);
+        assert_eq!(for_callers("Compile with --polygons ears"), "Compile with polygons ears");
+    }
 
     #[test]
     fn errors_of_files_and_limits_end_with_a_hint() {

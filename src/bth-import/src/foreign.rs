@@ -26,7 +26,7 @@ const STARTS: [(&[u8], &str, &str); 11] = [
     (b"Ogawa", "an Alembic file", EXPORT),
     (
         b"PK\x03\x04",
-        "a ZIP archive, as 3MF and USDZ files are",
+        "a ZIP archive, as USDZ files are",
         "python -m bth usd compiles USDZ files; else unpack it, or export the model as glTF",
     ),
     (b"\x1F\x8B", "a file compressed with gzip", UNPACK),

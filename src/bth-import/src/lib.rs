@@ -1,5 +1,5 @@
-//! Reads models: OBJ, PLY, STL, OFF, glTF, GLB and FBX into welded triangle meshes, and scenes of
-//! glTF and FBX into manifests.
+//! Reads models: OBJ, PLY, STL, OFF, glTF, GLB, FBX and 3MF into welded triangle meshes, and scenes
+//! of glTF, FBX and 3MF into manifests.
 //!
 //! [`import()`] is the entry point, and [`import_sequence`] and [`import_vertex_cache`] for meshes
 //! whose vertices move. `formats` finds the format, whose reader turns the file into a `raw` mesh

@@ -38,6 +38,7 @@ fn details() -> Result<Vec<(&'static str, String)>, Failure> {
     let available: Vec<String> =
         Isa::ALL.iter().filter(|isa| isa.is_available()).map(Isa::to_string).collect();
     let features = [
+        ("3mf", cfg!(feature = "3mf")),
         ("fbx", cfg!(feature = "fbx")),
         ("meshopt", cfg!(feature = "meshopt")),
         ("s3", cfg!(feature = "s3")),

@@ -150,8 +150,8 @@ fn the_help_lists_options_under_their_headings() {
         ("--materials", "What the file keeps"),
         ("--max-error", "Smaller files"),
         ("--deformable", "Objects that deform"),
-        ("--flatten", "Scenes from glTF and FBX"),
-        ("--strict", "Scenes from glTF and FBX"),
+        ("--flatten", "Scenes from glTF, FBX and 3MF"),
+        ("--strict", "Scenes from glTF, FBX and 3MF"),
         ("--depfile", "Many models and build systems"),
         ("--in-cache", "Cache"),
     ] {

@@ -11,7 +11,8 @@ mod stl;
 use std::path::{Path, PathBuf};
 
 use crate::error::Result;
-use crate::gltf::fbx;
+use crate::gltf::made::MadeFormat;
+use crate::gltf::{fbx, threemf};
 use crate::materials::{ImageFile, Looks};
 use crate::mesh::Wanted;
 use crate::raw::Raw;
@@ -20,7 +21,8 @@ use crate::text::without_mark;
 use crate::{foreign, gltf};
 
 /// All formats.
-pub(crate) const FORMATS: [Format; 6] = [GLTF, FBX, ply::FORMAT, stl::FORMAT, off::FORMAT, obj::FORMAT];
+pub(crate) const FORMATS: [Format; 7] =
+    [GLTF, FBX, THREEMF, ply::FORMAT, stl::FORMAT, off::FORMAT, obj::FORMAT];
 
 /// glTF and GLB.
 pub(crate) const GLTF: Format = Format {
@@ -33,9 +35,17 @@ pub(crate) const GLTF: Format = Format {
     images: |source, _| gltf::materials::images(source),
 };
 
-/// FBX, which is read as a glTF document.
-const FBX: Format =
-    Format { name: fbx::NAME, titles: &["FBX"], extensions: &[fbx::NAME], is_like: fbx::is_like, ..GLTF };
+/// Formats that are read as glTF documents.
+const FBX: Format = made(&fbx::FORMAT, &["FBX"], &["fbx"]);
+const THREEMF: Format = made(&threemf::FORMAT, &["3MF"], &["3mf"]);
+
+const fn made(
+    format: &MadeFormat,
+    titles: &'static [&'static str],
+    extensions: &'static [&'static str],
+) -> Format {
+    Format { name: format.name, titles, extensions, is_like: format.is_like, ..GLTF }
+}
 
 /// How a format is recognized and read.
 pub(crate) struct Format {
@@ -69,7 +79,7 @@ impl Format {
 
     /// Returns true for glTF and what is read like it: formats whose files hold scenes.
     pub(crate) fn is_scene(&self) -> bool {
-        [GLTF.name, FBX.name].contains(&self.name)
+        [GLTF.name, FBX.name, THREEMF.name].contains(&self.name)
     }
 
     /// Reads a source with its own rows.
@@ -172,6 +182,7 @@ mod tests {
             (b"# comment\n\nv 1 2 3\n", "obj"),
             (b"Kaydara FBX Binary  \0\x1A\0", "fbx"),
             (b"; FBX 7.5.0 project file\n", "fbx"),
+            (b"PK\x03\x04 3D/3dmodel.model", "3mf"),
             (b"PK\x03\x04", ""),
             (b"", ""),
         ] {

@@ -8,7 +8,7 @@ use std::cell::OnceCell;
 use crate::error::{Error, Result};
 use crate::gltf::container::split;
 use crate::gltf::extensions::{Use, VISIBILITY, unsupported_extension};
-use crate::gltf::fbx;
+use crate::gltf::made::MadeFormat;
 use crate::gltf::schema::{GltfDocument, GltfNode, Visibility};
 use crate::mesh::Polygons;
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
@@ -21,6 +21,9 @@ pub(super) const WEIGHTS: &str = "BTH-I017";
 /// The hint for most errors of a document.
 const EXPORT: &str = "export the model again";
 const CONVERT: &str = "convert the model to glTF 2.0";
+
+/// The name of the format itself.
+const GLTF: &str = "gltf";
 
 /// A document and the bytes behind it. Buffers are read and views are decompressed at first use.
 pub(crate) struct GltfFile<'a> {
@@ -43,11 +46,12 @@ impl<'a> GltfFile<'a> {
     /// triangles. Refuses required extensions that this use of it does not read.
     pub(crate) fn open(source: &'a Source<'a>, used: Use, polygons: Polygons) -> Result<Self> {
         source.fetched()?;
-        if fbx::is_fbx(source) {
-            let (document, bytes) = fbx::document(source, used, polygons)?.finish();
+        if let Some(format) = MadeFormat::of(source) {
+            let (document, bytes) = (format.document)(source, used, polygons)?.finish();
             let loaded = vec![OnceCell::from(Cow::Owned(bytes))];
             let decompressed = document.buffer_views.iter().map(|_| OnceCell::new()).collect();
-            return Ok(GltfFile { source, format: fbx::NAME, document, binary: None, loaded, decompressed });
+            let format = format.name;
+            return Ok(GltfFile { source, format, document, binary: None, loaded, decompressed });
         }
         let (json, binary) = split(source)?;
         let unsupported = |message| source.error_in_part(UNSUPPORTED, "asset", message, CONVERT);
@@ -74,7 +78,7 @@ impl<'a> GltfFile<'a> {
         }
         let loaded = document.buffers.iter().map(|_| OnceCell::new()).collect();
         let decompressed = document.buffer_views.iter().map(|_| OnceCell::new()).collect();
-        let file = GltfFile { source, format: "gltf", document, binary, loaded, decompressed };
+        let file = GltfFile { source, format: GLTF, document, binary, loaded, decompressed };
         file.check_transforms()?;
         match file.document.extensions_required.iter().find(|name| !used.reads(name)) {
             Some(name) => Err(unsupported_extension(source, name)),
@@ -84,7 +88,7 @@ impl<'a> GltfFile<'a> {
 
     /// Returns true if the document is made from a file of another format.
     pub(super) fn is_made(&self) -> bool {
-        self.format == fbx::NAME
+        self.format != GLTF
     }
 
     /// An error in a part of the document.

@@ -1,12 +1,63 @@
 //! A document that is made from a file of another format. It is then read like a glTF file, with
 //! all that these can have.
 
+use std::array::from_fn;
+
+use crate::error::{Error, Result};
+use crate::gltf::extensions::Use;
 use crate::gltf::schema::{Accessor, Buffer, BufferView, GltfDocument};
+use crate::gltf::{fbx, threemf};
+use crate::mesh::Polygons;
+use crate::source::{Source, UNSUPPORTED};
 
 /// Codes of component types (glTF 2.0 specification, §3.6.2.2).
 const U16: u64 = 5123;
 const U32: u64 = 5125;
 const F32: u64 = 5126;
+
+/// A format whose files are read as glTF documents.
+pub(crate) struct MadeFormat {
+    /// Its name in reports, and the extension of its files.
+    pub(crate) name: &'static str,
+    /// Returns true for content of the format.
+    pub(crate) is_like: fn(&[u8]) -> bool,
+    /// Makes the document.
+    pub(super) document: fn(&Source<'_>, Use, Polygons) -> Result<Made>,
+}
+
+impl MadeFormat {
+    /// The format of a file, by its extension or its content.
+    pub(super) fn of(source: &Source<'_>) -> Option<&'static MadeFormat> {
+        let extension = source.path.extension().unwrap_or_default();
+        let is_of = |format: &&MadeFormat| {
+            extension.eq_ignore_ascii_case(format.name) || (format.is_like)(source.data)
+        };
+        [&fbx::FORMAT, &threemf::FORMAT].into_iter().find(is_of)
+    }
+}
+
+/// The error for a file of a format that a build without a feature does not read.
+#[cfg_attr(all(feature = "fbx", feature = "3mf"), expect(dead_code))]
+pub(super) fn not_built(source: &Source<'_>, found: &str, feature: &str) -> Error {
+    let message = format!("expected a format that this build reads, found {found}");
+    let hint = format!("build with the cargo feature {feature}, or export the model as glTF");
+    source.error(UNSUPPORTED, message, &hint)
+}
+
+/// The middle of a mesh far from its origin, where f32 would move vertices by more than 2^-24 of
+/// its size.
+#[cfg_attr(not(any(feature = "fbx", feature = "3mf")), expect(dead_code))]
+pub(super) fn center(positions: impl Iterator<Item = [f64; 3]> + Clone) -> Option<[f64; 3]> {
+    let finite = || positions.clone().filter(|p| p.iter().all(|x| x.is_finite()));
+    let first = finite().next()?;
+    let (lower, upper) = finite().fold((first, first), |(lower, upper), p| {
+        (from_fn(|k| f64::min(lower[k], p[k])), from_fn::<_, 3, _>(|k| f64::max(upper[k], p[k])))
+    });
+    let size = (0..3).map(|k| upper[k] - lower[k]).fold(0.0, f64::max);
+    let is_far = finite().flatten().any(|x| (f64::from(x as f32) - x).abs() > size / f64::from(1 << 24));
+    let middle: [f64; 3] = from_fn(|k| f64::from((lower[k] / 2.0 + upper[k] / 2.0) as f32));
+    (is_far && middle.iter().all(|x| x.is_finite())).then_some(middle)
+}
 
 /// A document and the bytes of its only buffer.
 #[derive(Default)]

@@ -5,7 +5,7 @@
 //! decompresses them, `uv_set` chooses texture coordinates), `rigid_parts` which of them a joint
 //! moves alone, `placed_mesh` which meshes there are and where, and `flatten` a model. `materials`
 //! reads how they look, `cutout` which materials make holes. [`scene`] makes a manifest instead.
-//! `fbx` makes a document of another format (`made`).
+//! `fbx` and `threemf` make documents of other formats (`made`).
 
 mod accessor;
 mod alpha_image;
@@ -18,7 +18,7 @@ pub(crate) mod extensions;
 pub(crate) mod fbx;
 pub(crate) mod file;
 pub(crate) mod flatten;
-mod made;
+pub(crate) mod made;
 mod material;
 pub(crate) mod materials;
 mod meshopt;
@@ -30,6 +30,7 @@ pub mod scene;
 mod schema;
 mod source_files;
 mod texture_reader;
+pub(crate) mod threemf;
 mod transform;
 mod uri;
 mod uv_set;

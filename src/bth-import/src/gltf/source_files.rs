@@ -8,7 +8,7 @@ use crate::cutout::AlphaMode;
 use crate::error::Result;
 use crate::gltf::container::split;
 use crate::gltf::extensions::{MESHOPT, Use};
-use crate::gltf::fbx;
+use crate::gltf::made::MadeFormat;
 use crate::gltf::schema::{Buffer, GltfDocument, MeshoptFallback};
 use crate::gltf::uri::beside;
 use crate::materials::Looks;
@@ -40,11 +40,11 @@ pub(crate) fn files(path: &Path, looks: Looks) -> Result<Vec<PathBuf>> {
 
 /// Returns the document, if there is one and it can name other files.
 fn document(source: &Source<'_>, looks: Looks) -> Option<GltfDocument> {
-    if fbx::is_fbx(source) {
+    if let Some(format) = MadeFormat::of(source) {
         // Its meshes are in the file itself.
         let has_images = looks.materials || looks.alpha != AlphaMode::None;
         return has_images
-            .then(|| fbx::document(source, Use::Parts, looks.polygons).ok())
+            .then(|| (format.document)(source, Use::Parts, looks.polygons).ok())
             .flatten()
             .map(|made| made.document);
     }

@@ -26,6 +26,8 @@ mod rounding;
 mod sequence;
 mod stl;
 mod textures;
+#[cfg(feature = "3mf")]
+mod threemf;
 
 use std::sync::Mutex;
 

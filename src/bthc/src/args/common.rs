@@ -19,7 +19,7 @@ Exit codes:
 // would hold for what follows the group, too.
 pub(super) const CACHE: &str = "Cache";
 pub(super) const DEFORMING: &str = "Objects that deform";
-pub(super) const GLTF: &str = "Scenes from glTF and FBX";
+pub(super) const GLTF: &str = "Scenes from glTF, FBX and 3MF";
 pub(super) const JOBS: &str = "Many models and build systems";
 pub(super) const KEPT: &str = "What the file keeps";
 pub(super) const SMALLER: &str = "Smaller files";

@@ -15,7 +15,7 @@ use bth_import::Keep;
 use clap::Args as Group;
 use std::path::PathBuf;
 
-/// Compile a model (OBJ, PLY, STL, OFF) or a scene (glTF, GLB, scene manifest) into a BTH file.
+/// Compile a model (OBJ, PLY, STL, OFF) or a scene (glTF, GLB, FBX, 3MF, scene manifest) into a BTH file.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Compile {
@@ -91,8 +91,8 @@ pub(crate) struct Compile {
     /// Print nothing but warnings and errors.
     #[arg(short, long)]
     pub(crate) quiet: bool,
-    /// Make one object of a glTF or FBX file: its scene at rest, in world space, without hierarchy
-    /// and animation.
+    /// Make one object of a glTF, FBX or 3MF file: its scene at rest, in world space, without
+    /// hierarchy and animation.
     #[arg(long, help_heading = GLTF, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "rigid_parts", "strict"])]
     pub(crate) flatten: bool,
     #[command(flatten)]

@@ -1,9 +1,9 @@
-//! Options of scenes from glTF and FBX.
+//! Options of scenes from glTF, FBX and 3MF.
 
 use super::common::{GLTF, positive};
 use clap::Args as Group;
 
-/// What of a glTF or FBX file becomes a scene.
+/// What of a glTF, FBX or 3MF file becomes a scene.
 #[derive(Clone, Debug, Group)]
 pub(crate) struct Gltf {
     /// Scene by name or number; by default the file's own choice.

@@ -20,9 +20,9 @@ pub(crate) struct Jobs {
     /// Also write which files the outputs depend on, for Make and Ninja.
     #[arg(long, help_heading = JOBS, value_name = "FILE", value_parser = output_file())]
     pub(crate) depfile: Option<PathBuf>,
-    /// Format of a model from standard input: obj, ply, stl, off, glb or fbx; by default by its
-    /// content.
-    #[arg(long, help_heading = JOBS, value_name = "FORMAT", value_parser = ["obj", "ply", "stl", "off", "glb", "fbx"])]
+    /// Format of a model from standard input: obj, ply, stl, off, glb, fbx or 3mf; by default by
+    /// its content.
+    #[arg(long, help_heading = JOBS, value_name = "FORMAT", value_parser = ["obj", "ply", "stl", "off", "glb", "fbx", "3mf"])]
     pub(crate) format: Option<String>,
     /// Go on: compile again whenever one of the files changes, until Ctrl-C.
     #[arg(long, help_heading = JOBS, conflicts_with_all = ["json", "in_cache", "depfile"])]

@@ -55,12 +55,12 @@ pub(crate) enum Command {
     Man,
 }
 
-/// Write a scene manifest from a glTF or FBX scene, to be edited and compiled. It refers to the
-/// meshes of the file, so keep it in the folder of that file or above.
+/// Write a scene manifest from a glTF, FBX or 3MF scene, to be edited and compiled. It refers to
+/// the meshes of the file, so keep it in the folder of that file or above.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Import {
-    /// The glTF, GLB or FBX file.
+    /// The glTF, GLB, FBX or 3MF file.
     pub(crate) model: PathBuf,
     /// The manifest; by default the model's name with the extension .manifest, in the same folder.
     #[arg(short, long, value_name = "FILE")]
@@ -75,11 +75,11 @@ pub(crate) struct Import {
     pub(crate) quiet: bool,
 }
 
-/// Show what a BTH file or a model contains: boxes, names, materials; of a glTF or FBX file also
-/// its animations, and what a scene skips.
+/// Show what a BTH file or a model contains: boxes, names, materials; of a glTF, FBX or 3MF
+/// file also its animations, and what a scene skips.
 #[derive(Debug, Group)]
 pub(crate) struct Info {
-    /// The compiled file, or a model: OBJ, PLY, STL, OFF, glTF, GLB, FBX.
+    /// The compiled file, or a model: OBJ, PLY, STL, OFF, glTF, GLB, FBX, 3MF.
     #[arg(required_unless_present = "cpu")]
     pub(crate) file: Option<PathBuf>,
     /// Show the processor's features that tracing may use.

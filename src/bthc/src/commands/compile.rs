@@ -179,7 +179,7 @@ fn warn_of_options(args: &Compile, jobs: &[Job], monitor: &dyn Monitor) {
         && !jobs.iter().any(is_gltf_scene)
     {
         monitor.warn(&format!(
-            "{option} has no effect: no model is a glTF or FBX file that is compiled as a scene"
+            "{option} has no effect: no model is a glTF, FBX or 3MF file that is compiled as a scene"
         ));
     }
     if !jobs.iter().any(|job| scene::is_scene(&job.model, args)) {

@@ -1,4 +1,4 @@
-//! `bthc import`: writes a scene manifest for a glTF or FBX file.
+//! `bthc import`: writes a scene manifest for a glTF, FBX or 3MF file.
 
 use super::scene::folder;
 use crate::args::Import;
@@ -14,7 +14,7 @@ use std::path::{Component, Path};
 
 pub(crate) fn run(args: &Import) -> Result<(), Failure> {
     if !bth_import::is_scene(&args.model) {
-        let message = format!("{} is no glTF, GLB or FBX file", args.model.display());
+        let message = format!("{} is no glTF, GLB, FBX or 3MF file", args.model.display());
         return Err(Failure::Usage { message, hint: "manifests of other models are written by hand" });
     }
     let path = args.output.clone().unwrap_or_else(|| args.model.with_extension("manifest"));

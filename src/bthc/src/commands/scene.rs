@@ -1,4 +1,4 @@
-//! `bthc compile` of scenes: glTF and FBX files and manifests.
+//! `bthc compile` of scenes: glTF, FBX and 3MF files and manifests.
 
 use super::deliver::deliver;
 use super::job::{self, Job, JobContext, JobReport, Target};

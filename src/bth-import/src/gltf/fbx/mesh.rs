@@ -10,7 +10,7 @@ use ufbx::{
 
 use crate::deformation::MOST_INFLUENCES;
 use crate::error::{Place, Result};
-use crate::gltf::made::Made;
+use crate::gltf::made::{Made, center};
 use crate::gltf::schema::{Faces, GltfMesh, GltfSkin, Primitive};
 use crate::mesh::Polygons;
 use crate::raw::{Raw, check_rows};
@@ -71,7 +71,9 @@ pub(super) fn shapes(
 ) -> Result<Vec<Shape>> {
     let mut one = |mesh: &Mesh| {
         source.monitor.check()?;
-        let center = center(mesh);
+        // What skins and shapes move stays where it is.
+        let moves = mesh.skin_deformers.count + mesh.blend_deformers.count > 0;
+        let center = center(mesh.vertices.iter().map(numbers)).filter(|_| !moves);
         let materials = mesh.materials.as_ref();
         let mut rows = CornerRows::new(mesh, center.unwrap_or_default());
         let mut parts = Vec::new();
@@ -86,21 +88,6 @@ pub(super) fn shapes(
 
 fn numbers(v: &Vec3) -> [f64; 3] {
     [v.x, v.y, v.z]
-}
-
-/// The middle of a mesh far from its origin, where f32 would move vertices by more than 2^-24 of
-/// its size. What skins and shapes move stays where it is.
-fn center(mesh: &Mesh) -> Option<[f64; 3]> {
-    let finite = || mesh.vertices.iter().map(numbers).filter(|p| p.iter().all(|x| x.is_finite()));
-    let first = finite().next()?;
-    let (lower, upper) = finite().fold((first, first), |(lower, upper), p| {
-        (from_fn(|k| f64::min(lower[k], p[k])), from_fn::<_, 3, _>(|k| f64::max(upper[k], p[k])))
-    });
-    let size = (0..3).map(|k| upper[k] - lower[k]).fold(0.0, f64::max);
-    let is_far = finite().flatten().any(|x| (f64::from(x as f32) - x).abs() > size / f64::from(1 << 24));
-    let moves = mesh.skin_deformers.count + mesh.blend_deformers.count > 0;
-    let middle: [f64; 3] = from_fn(|k| f64::from((lower[k] / 2.0 + upper[k] / 2.0) as f32));
-    (is_far && !moves && middle.iter().all(|x| x.is_finite())).then_some(middle)
 }
 
 /// Gives corners rows: one for all corners of a vertex with equal attributes.

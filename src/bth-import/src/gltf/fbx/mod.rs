@@ -14,32 +14,14 @@ mod motion;
 #[cfg(feature = "fbx")]
 mod scene;
 
-#[cfg(feature = "fbx")]
-pub(super) use scene::document;
+use crate::gltf::made::MadeFormat;
 
-use crate::source::Source;
-
-/// Its name in reports.
-pub(crate) const NAME: &str = "fbx";
-
-/// Returns true for content of the format.
-pub(crate) fn is_like(data: &[u8]) -> bool {
-    data.starts_with(b"Kaydara FBX Binary") || data.starts_with(b"; FBX")
-}
-
-/// Returns true for a file of the format.
-pub(super) fn is_fbx(source: &Source<'_>) -> bool {
-    source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case(NAME)) || is_like(source.data)
-}
-
-/// Without the library there is only an error.
-#[cfg(not(feature = "fbx"))]
-pub(super) fn document(
-    source: &Source<'_>,
-    _: crate::gltf::extensions::Use,
-    _: crate::mesh::Polygons,
-) -> crate::error::Result<crate::gltf::made::Made> {
-    let message = "expected a format that this build reads, found an FBX file";
-    let hint = "build with the cargo feature fbx, or export the model as glTF";
-    Err(source.error(crate::source::UNSUPPORTED, message, hint))
-}
+/// Reads the format; without the library there is only an error.
+pub(crate) const FORMAT: MadeFormat = MadeFormat {
+    name: "fbx",
+    is_like: |data| data.starts_with(b"Kaydara FBX Binary") || data.starts_with(b"; FBX"),
+    #[cfg(feature = "fbx")]
+    document: scene::document,
+    #[cfg(not(feature = "fbx"))]
+    document: |source, _, _| Err(crate::gltf::made::not_built(source, "an FBX file", "fbx")),
+};

@@ -20,7 +20,7 @@ const FIRST_WITH_VISIBILITY: u32 = 6000;
 const LIGHTS: &str = "KHR_lights_punctual";
 
 /// Makes a glTF document of a file, in metres and with y up.
-pub(in crate::gltf) fn document(source: &Source<'_>, used: Use, polygons: Polygons) -> Result<Made> {
+pub(super) fn document(source: &Source<'_>, used: Use, polygons: Polygons) -> Result<Made> {
     let scene = load(source)?;
     let mut made = Made::default();
     made.document.asset.space = Some(space(&scene));

@@ -3,12 +3,12 @@
 
 use std::array::from_fn;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gltf::extensions::Use;
 use crate::gltf::schema::{Accessor, Buffer, BufferView, GltfDocument};
 use crate::gltf::{fbx, threemf};
 use crate::mesh::Polygons;
-use crate::source::{Source, UNSUPPORTED};
+use crate::source::Source;
 
 /// Codes of component types (glTF 2.0 specification, §3.6.2.2).
 const U16: u64 = 5123;
@@ -37,16 +37,15 @@ impl MadeFormat {
 }
 
 /// The error for a file of a format that a build without a feature does not read.
-#[cfg_attr(all(feature = "fbx", feature = "3mf"), expect(dead_code))]
-pub(super) fn not_built(source: &Source<'_>, found: &str, feature: &str) -> Error {
+#[cfg(not(all(feature = "fbx", feature = "3mf")))]
+pub(super) fn not_built(source: &Source<'_>, found: &str, feature: &str) -> crate::error::Error {
     let message = format!("expected a format that this build reads, found {found}");
     let hint = format!("build with the cargo feature {feature}, or export the model as glTF");
-    source.error(UNSUPPORTED, message, &hint)
+    source.error(crate::source::UNSUPPORTED, message, &hint)
 }
 
 /// The middle of a mesh far from its origin, where f32 would move vertices by more than 2^-24 of
 /// its size.
-#[cfg_attr(not(any(feature = "fbx", feature = "3mf")), expect(dead_code))]
 pub(super) fn center(positions: impl Iterator<Item = [f64; 3]> + Clone) -> Option<[f64; 3]> {
     let finite = || positions.clone().filter(|p| p.iter().all(|x| x.is_finite()));
     let first = finite().next()?;

@@ -18,6 +18,8 @@ pub(crate) mod extensions;
 pub(crate) mod fbx;
 pub(crate) mod file;
 pub(crate) mod flatten;
+// What other formats need.
+#[cfg_attr(not(all(feature = "fbx", feature = "3mf")), allow(dead_code))]
 pub(crate) mod made;
 mod material;
 pub(crate) mod materials;

@@ -12,7 +12,7 @@ use crate::gltf::threemf::object::{Look, Object, WHITE};
 use crate::gltf::threemf::package::Package;
 use crate::gltf::threemf::part::{Element, Then};
 use crate::materials::linear;
-use crate::source::{INDEX, INDEX_HINT, MALFORMED, Source, UNSUPPORTED};
+use crate::source::{INDEX, MALFORMED, Source, UNSUPPORTED};
 
 const CORE: &[u8] = b"http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
 const MATERIAL: &[u8] = b"http://schemas.microsoft.com/3dmanufacturing/material/2015/02";
@@ -350,7 +350,7 @@ impl Model<'_> {
     /// The error for a reference to an object that is not there.
     pub(super) fn no_object(&self, (part, id): Key) -> Error {
         let message = "expected this object, which is referred to, found none";
-        self.source.error_in_part(INDEX, format!("{} object {id}", self.parts[part]), message, INDEX_HINT)
+        self.source.error_in_part(INDEX, format!("{} object {id}", self.parts[part]), message, EXPORT)
     }
 }
 

@@ -1,5 +1,5 @@
 //! 3MF: what becomes of objects, components, items, units, materials, colours and other parts, what
-//! is left out or refused, and packages that are damaged at random.
+//! is skipped or refused, and packages that are damaged at random.
 
 use super::*;
 use bth_import::gltf::scene::{self, ImportOptions};
@@ -13,7 +13,7 @@ const RELATIONSHIPS: &str = r#"<?xml version="1.0"?>
 <Relationship Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel" Target="/3D/3dmodel.model" Id="b"/>
 </Relationships>"#;
 /// A plate of two materials and a plate of colours, an assembly of these, and an object of another
-/// part. A beam lattice and a texture are left out.
+/// part. A beam lattice and a texture are skipped.
 const ROOT: &str = include_str!("../../../../fuzz/seeds/threemf/plates.model");
 const OTHER: &str = r#"<model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" unit="inch"><resources>
 <object id="4" name="Far"><mesh>
@@ -138,6 +138,7 @@ fn what_is_malformed_is_refused_with_its_place() {
     let pair = |text: &[u8]| package(&[("_rels/.rels", RELATIONSHIPS.as_bytes()), (root, text)]);
     for (bytes, code, place, message) in [
         (pair(b"%3McF and more"), "BTH-I006", root, "not encrypted"),
+        (pair(b"<a/>"), "BTH-I002", root, "element model"),
         (pair(b"\xFF\xFE<\0"), "BTH-I006", root, "UTF-16"),
         (pair(&vec![b' '; 40 << 20]), "BTH-I002", root, "256 times"),
         (package(&[(root, ROOT.as_bytes())]), "BTH-I002", "_rels/.rels", "found none"),

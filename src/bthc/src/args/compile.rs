@@ -15,7 +15,8 @@ use bth_import::Keep;
 use clap::Args as Group;
 use std::path::PathBuf;
 
-/// Compile a model (OBJ, PLY, STL, OFF) or a scene (glTF, GLB, FBX, 3MF, scene manifest) into a BTH file.
+/// Compile a model (OBJ, PLY, STL, OFF) or a scene (glTF, GLB, FBX, 3MF, scene manifest) into a BTH
+/// file.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Compile {

@@ -8,15 +8,14 @@ use serde_json::json;
 use crate::error::{Error, Result};
 use crate::gltf::made::Made;
 use crate::gltf::threemf::EXPORT;
-use crate::gltf::threemf::object::{Look, Object, WHITE};
+use crate::gltf::threemf::object::{Key, Look, Object, Placed, WHITE, floats};
 use crate::gltf::threemf::package::Package;
-use crate::gltf::threemf::part::{Element, Then};
-use crate::materials::linear;
+use crate::gltf::threemf::part::{PartElement, Then};
 use crate::source::{INDEX, MALFORMED, Source, UNSUPPORTED};
 
 const CORE: &[u8] = b"http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
 const MATERIAL: &[u8] = b"http://schemas.microsoft.com/3dmanufacturing/material/2015/02";
-/// Extensions that a file may require: what they add is read or left out with a warning.
+/// Extensions that a file may require: what they add is read or skipped with a warning.
 const KNOWN: [&str; 7] = [
     "material/2015/02",
     "production/2015/06",
@@ -30,28 +29,18 @@ const KNOWN: [&str; 7] = [
 const EXTENSIONS: &str = "http://schemas.microsoft.com/3dmanufacturing/";
 const RELATIONSHIPS: &str = "_rels/.rels";
 const ROOT: &str = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
-/// Kinds of elements that are left out and counted apart.
+/// Kinds of elements that are skipped and counted apart.
 const MOST_KINDS: usize = 16;
-/// Units by their names, in metres.
-const UNITS: [(&str, f64); 6] = [
-    ("micron", 1e-6),
-    ("millimeter", 1e-3),
-    ("centimeter", 1e-2),
-    ("inch", 0.0254),
-    ("foot", 0.3048),
-    ("meter", 1.0),
+/// Micrometres of units by their names.
+const UNITS: [(&str, u32); 6] = [
+    ("micron", 1),
+    ("millimeter", 1_000),
+    ("centimeter", 10_000),
+    ("inch", 25_400),
+    ("foot", 304_800),
+    ("meter", 1_000_000),
 ];
 const DEFAULT_UNIT: &str = "millimeter";
-
-/// An object by the numbers of its part and in it.
-pub(super) type Key = (usize, u32);
-
-/// An object at a place: a component of another, or an item that is built.
-pub(super) struct Placed {
-    pub(super) key: Key,
-    /// The matrix of a node in glTF, by columns.
-    pub(super) matrix: [f64; 16],
-}
 
 /// What is in a package.
 pub(super) struct Model<'m> {
@@ -64,16 +53,18 @@ pub(super) struct Model<'m> {
     pub(super) items: Vec<Placed>,
     /// The name of the unit.
     unit: String,
-    /// Elements that are left out: how many, and where the first is.
+    /// Set by the element of the open part that holds all others.
+    has_model: bool,
+    /// Elements that are skipped: how many, and where the first is.
     left_out: BTreeMap<String, (u64, String)>,
     part: usize,
-    groups: HashMap<u32, Group>,
+    groups: HashMap<u32, Properties>,
     group: u32,
     object: Option<(u32, Object)>,
 }
 
 /// What the properties of triangles are taken from.
-enum Group {
+enum Properties {
     /// Materials from this one on.
     Materials {
         first: usize,
@@ -88,7 +79,7 @@ enum Group {
 pub(super) fn read<'m>(source: &'m Source<'m>, made: &'m mut Made) -> Result<Model<'m>> {
     let mut package = Package::open(source)?;
     let mut root = None;
-    let relationship = |root: &mut Option<String>, _: &[u8], name: &[u8], element: &Element<'_>| {
+    let relationship = |root: &mut Option<String>, _: &[u8], name: &[u8], element: &PartElement<'_>| {
         let [kind, target] = element.texts(["Type", "Target"])?;
         if name == b"Relationship" && kind == ROOT {
             root.get_or_insert(target);
@@ -108,6 +99,7 @@ pub(super) fn read<'m>(source: &'m Source<'m>, made: &'m mut Made) -> Result<Mod
         objects: HashMap::new(),
         items: Vec::new(),
         unit: DEFAULT_UNIT.to_owned(),
+        has_model: false,
         left_out: BTreeMap::new(),
         part: 0,
         groups: HashMap::new(),
@@ -119,7 +111,12 @@ pub(super) fn read<'m>(source: &'m Source<'m>, made: &'m mut Made) -> Result<Mod
         let part = package.part(part)?;
         model.groups.clear();
         model.object = None;
+        model.has_model = false;
         part.elements(&mut model, Model::start, Model::end)?;
+        if !model.has_model {
+            let message = "expected an element model of 3MF, found none";
+            return Err(source.error_in_part(MALFORMED, part.name, message, EXPORT));
+        }
         model.part += 1;
     }
     Ok(model)
@@ -132,17 +129,18 @@ fn name(path: &str) -> String {
 impl Model<'_> {
     /// Metres of the unit.
     pub(super) fn unit(&self) -> f64 {
-        UNITS.iter().find(|(name, _)| *name == self.unit).map_or(1e-3, |unit| unit.1)
+        let unit = UNITS.iter().find(|(name, _)| *name == self.unit).unwrap_or(&UNITS[1]);
+        f64::from(unit.1) / f64::from(1_000_000)
     }
 
-    /// Warns of what is left out.
+    /// Warns of what is skipped.
     pub(super) fn warn(&self) {
         for (what, (count, place)) in &self.left_out {
             self.source.monitor.warn(&format!("{count} {what} left out, the first at {place}"));
         }
     }
 
-    fn start(&mut self, namespace: &[u8], name: &[u8], element: &Element<'_>) -> Result<Then> {
+    fn start(&mut self, namespace: &[u8], name: &[u8], element: &PartElement<'_>) -> Result<Then> {
         match (namespace, name) {
             (CORE, b"vertex") => self.object(element)?.vertices.push(element.numbers(["x", "y", "z"])?),
             (CORE, b"triangle") => self.triangle(element)?,
@@ -159,13 +157,13 @@ impl Model<'_> {
             }
             (CORE, b"basematerials") => {
                 let first = self.made.document.materials.len();
-                self.open_group(element, Group::Materials { first, count: 0 })?;
+                self.open_group(element, Properties::Materials { first, count: 0 })?;
             }
             (CORE, b"base") => self.material(element)?,
-            (MATERIAL, b"colorgroup") => self.open_group(element, Group::Colors(Vec::new()))?,
+            (MATERIAL, b"colorgroup") => self.open_group(element, Properties::Colors(Vec::new()))?,
             (MATERIAL, b"color") => {
                 let color = color(element, "color")?;
-                if let Some(Group::Colors(colors)) = self.groups.get_mut(&self.group) {
+                if let Some(Properties::Colors(colors)) = self.groups.get_mut(&self.group) {
                     colors.push(color);
                 }
             }
@@ -185,7 +183,8 @@ impl Model<'_> {
         Ok(())
     }
 
-    fn model(&mut self, element: &Element<'_>) -> Result<()> {
+    fn model(&mut self, element: &PartElement<'_>) -> Result<()> {
+        self.has_model = true;
         let [unit, required] = element.texts(["unit", "requiredextensions"])?;
         if self.part == 0 && !unit.is_empty() {
             self.unit = unit;
@@ -210,11 +209,11 @@ impl Model<'_> {
     }
 
     /// Counts an element of an extension that is not read. What refers to it has no look.
-    fn leave_out(&mut self, namespace: &[u8], name: &[u8], element: &Element<'_>) -> Result<Then> {
+    fn leave_out(&mut self, namespace: &[u8], name: &[u8], element: &PartElement<'_>) -> Result<Then> {
         if let [Some(id)] = element.values(["id"])?
             && let Some(id) = element.number("id", &Some(id))?
         {
-            self.groups.insert(id, Group::LeftOut);
+            self.groups.insert(id, Properties::LeftOut);
         }
         let [name, namespace] = [name, namespace].map(String::from_utf8_lossy);
         let namespace = namespace.strip_prefix(EXTENSIONS).unwrap_or(&namespace);
@@ -227,12 +226,12 @@ impl Model<'_> {
     }
 
     /// The object that is open.
-    fn object(&mut self, element: &Element<'_>) -> Result<&mut Object> {
+    fn object(&mut self, element: &PartElement<'_>) -> Result<&mut Object> {
         let outside = || element.error(MALFORMED, "expected this element in an object");
         self.object.as_mut().map(|(_, object)| object).ok_or_else(outside)
     }
 
-    fn open_object(&mut self, element: &Element<'_>) -> Result<()> {
+    fn open_object(&mut self, element: &PartElement<'_>) -> Result<()> {
         let [id] = element.numbers(["id"])?;
         if self.objects.contains_key(&(self.part, id)) || self.object.is_some() {
             return Err(element.error(MALFORMED, format!("expected an object of a new id, found {id}")));
@@ -245,7 +244,7 @@ impl Model<'_> {
         Ok(())
     }
 
-    fn open_group(&mut self, element: &Element<'_>, group: Group) -> Result<()> {
+    fn open_group(&mut self, element: &PartElement<'_>, group: Properties) -> Result<()> {
         let [id] = element.numbers(["id"])?;
         if self.groups.insert(id, group).is_some() {
             return Err(element.error(MALFORMED, format!("expected a group of a new id, found {id}")));
@@ -254,8 +253,10 @@ impl Model<'_> {
         Ok(())
     }
 
-    fn material(&mut self, element: &Element<'_>) -> Result<()> {
-        let Some(Group::Materials { count, .. }) = self.groups.get_mut(&self.group) else { return Ok(()) };
+    fn material(&mut self, element: &PartElement<'_>) -> Result<()> {
+        let Some(Properties::Materials { count, .. }) = self.groups.get_mut(&self.group) else {
+            return Ok(());
+        };
         *count += 1;
         let [r, g, b, a] = floats(color(element, "displaycolor")?);
         let [name] = element.texts(["name"])?;
@@ -268,7 +269,7 @@ impl Model<'_> {
         Ok(())
     }
 
-    fn placed(&mut self, element: &Element<'_>) -> Result<Placed> {
+    fn placed(&mut self, element: &PartElement<'_>) -> Result<Placed> {
         let [id] = element.numbers(["objectid"])?;
         let [path] = element.texts(["path"])?;
         let [transform] = element.texts(["transform"])?;
@@ -298,7 +299,7 @@ impl Model<'_> {
         number
     }
 
-    fn triangle(&mut self, element: &Element<'_>) -> Result<()> {
+    fn triangle(&mut self, element: &PartElement<'_>) -> Result<()> {
         const NAMES: [&str; 7] = ["v1", "v2", "v3", "pid", "p1", "p2", "p3"];
         let values = element.values(NAMES)?;
         let mut numbers = [None; 7];
@@ -326,23 +327,23 @@ impl Model<'_> {
     }
 
     /// How a triangle looks whose corners have these properties of a group.
-    fn look(&self, element: &Element<'_>, group: u32, rows: [u32; 3]) -> Result<Look> {
+    fn look(&self, element: &PartElement<'_>, group: u32, rows: [u32; 3]) -> Result<Look> {
         let missing = |count: usize, row: u32| {
             element.error(INDEX, format!("expected a property below {count} of group {group}, found {row}"))
         };
         match self.groups.get(&group) {
-            Some(Group::Materials { first, count }) => match rows[0] < *count {
+            Some(Properties::Materials { first, count }) => match rows[0] < *count {
                 true => Ok(Look { material: Some(first + rows[0] as usize), colors: [WHITE; 3] }),
                 false => Err(missing(*count as usize, rows[0])),
             },
-            Some(Group::Colors(colors)) => {
+            Some(Properties::Colors(colors)) => {
                 let mut look = Look::default();
                 for (color, row) in look.colors.iter_mut().zip(rows) {
                     *color = *colors.get(row as usize).ok_or_else(|| missing(colors.len(), row))?;
                 }
                 Ok(look)
             }
-            Some(Group::LeftOut) => Ok(Look::default()),
+            Some(Properties::LeftOut) => Ok(Look::default()),
             None => Err(element.error(INDEX, format!("expected a group of properties, found {group}"))),
         }
     }
@@ -355,16 +356,10 @@ impl Model<'_> {
 }
 
 /// A colour in sRGB, `#RRGGBB` or `#RRGGBBAA`.
-fn color(element: &Element<'_>, name: &str) -> Result<[u8; 4]> {
+fn color(element: &PartElement<'_>, name: &str) -> Result<[u8; 4]> {
     let [text] = element.texts([name])?;
     let digits = text.strip_prefix('#').filter(|digits| [6, 8].contains(&digits.len()) && digits.is_ascii());
     let number = digits.and_then(|digits| u32::from_str_radix(&format!("{digits:F<8}"), 16).ok());
     let message = || format!("expected a colour such as #FF8000 as {name}, found \"{text}\"");
     number.map(u32::to_be_bytes).ok_or_else(|| element.error(MALFORMED, message()))
-}
-
-/// A colour in sRGB, linear.
-pub(super) fn floats([r, g, b, a]: [u8; 4]) -> [f32; 4] {
-    let part = |x: u8| f32::from(x) / 255.0;
-    [linear(part(r)), linear(part(g)), linear(part(b)), part(a)]
 }

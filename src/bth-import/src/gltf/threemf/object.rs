@@ -5,10 +5,20 @@ use std::collections::{BTreeMap, HashMap};
 use crate::error::Result;
 use crate::gltf::made::{Made, center};
 use crate::gltf::schema::{GltfMesh, Primitive};
-use crate::gltf::threemf::model::{Placed, floats};
+use crate::materials::linear;
 use crate::raw::{check_rows, check_triangles};
 
 pub(super) const WHITE: [u8; 4] = [255; 4];
+
+/// An object by the numbers of its part and in it.
+pub(super) type Key = (usize, u32);
+
+/// An object at a place: a component of another, or an item that is built.
+pub(super) struct Placed {
+    pub(super) key: Key,
+    /// The matrix of a node in glTF, by columns.
+    pub(super) matrix: [f64; 16],
+}
 
 #[derive(Default)]
 pub(super) struct Object {
@@ -21,7 +31,7 @@ pub(super) struct Object {
     pub(super) mesh: Option<usize>,
     pub(super) center: Option<[f64; 3]>,
     /// Triangles by their materials.
-    primitives: BTreeMap<Option<usize>, Rows>,
+    primitives: BTreeMap<Option<usize>, VertexRows>,
 }
 
 /// How a triangle looks: its material and the colours of its corners.
@@ -36,9 +46,9 @@ impl Default for Look {
     }
 }
 
-/// Rows of vertices with colours, and triangles.
+/// VertexRows of vertices with colours, and triangles.
 #[derive(Default)]
-struct Rows {
+struct VertexRows {
     numbers: HashMap<(u32, [u8; 4]), u32>,
     rows: Vec<(u32, [u8; 4])>,
     indices: Vec<u32>,
@@ -73,7 +83,7 @@ impl Object {
         }
         self.center = center(vertices.iter().copied());
         let middle = self.center.unwrap_or_default();
-        let primitive = |(material, rows): (Option<usize>, Rows)| {
+        let primitive = |(material, rows): (Option<usize>, VertexRows)| {
             let mut primitive = Primitive { material, ..Primitive::default() };
             let position = |row: &(u32, [u8; 4])| {
                 let p = vertices[row.0 as usize];
@@ -92,4 +102,10 @@ impl Object {
         made.document.meshes.push(GltfMesh { name: self.name.clone(), primitives, weights: None });
         Ok(())
     }
+}
+
+/// A colour in sRGB, linear.
+pub(super) fn floats([r, g, b, a]: [u8; 4]) -> [f32; 4] {
+    let part = |x: u8| f32::from(x) / 255.0;
+    [linear(part(r)), linear(part(g)), linear(part(b)), part(a)]
 }

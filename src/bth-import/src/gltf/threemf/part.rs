@@ -12,7 +12,7 @@ use crate::gltf::threemf::EXPORT;
 use crate::source::{MALFORMED, Source, TRUNCATED};
 use crate::text::{float, shown, without_mark};
 
-/// Elements may be in so many others.
+/// The number of elements that an element may be in.
 const DEEPEST: usize = 256;
 /// The attribute with the name of another part has the prefix of an extension.
 const PATH: &str = "path";
@@ -24,7 +24,7 @@ pub(super) struct Part<'a> {
 }
 
 /// The start of an element.
-pub(super) struct Element<'e> {
+pub(super) struct PartElement<'e> {
     part: &'e Part<'e>,
     start: &'e BytesStart<'e>,
     resolver: &'e NamespaceResolver,
@@ -57,7 +57,7 @@ impl Part<'_> {
     pub(super) fn elements<V>(
         &self,
         visitor: &mut V,
-        start: impl Fn(&mut V, &[u8], &[u8], &Element<'_>) -> Result<Then>,
+        start: impl Fn(&mut V, &[u8], &[u8], &PartElement<'_>) -> Result<Then>,
         end: impl Fn(&mut V, &[u8]) -> Result<()>,
     ) -> Result<()> {
         let text = without_mark(&self.text);
@@ -87,7 +87,7 @@ impl Part<'_> {
                             ResolveResult::Bound(namespace) => namespace.as_ref(),
                             _ => b"",
                         };
-                        let it = Element { part: self, start: &element, resolver, at };
+                        let it = PartElement { part: self, start: &element, resolver, at };
                         if start(visitor, namespace, name.as_ref(), &it)? == Then::Behind {
                             behind = Some(depth);
                         }
@@ -118,7 +118,7 @@ impl Part<'_> {
     }
 }
 
-impl Element<'_> {
+impl PartElement<'_> {
     pub(super) fn error(&self, code: &'static str, message: impl Into<String>) -> Error {
         self.part.error(code, self.at, message)
     }

@@ -5,7 +5,8 @@ use crate::gltf::extensions::Use;
 use crate::gltf::file::GRAPH;
 use crate::gltf::made::Made;
 use crate::gltf::schema::{GltfNode, GltfScene};
-use crate::gltf::threemf::model::{Model, Placed, read};
+use crate::gltf::threemf::model::{Model, read};
+use crate::gltf::threemf::object::Placed;
 use crate::mesh::Polygons;
 use crate::source::Source;
 

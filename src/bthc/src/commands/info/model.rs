@@ -11,8 +11,8 @@ use bth_import::{Mesh, Report, Silent, Wanted};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Reads a model, of a glTF, FBX or 3MF file also what becomes a scene by default and what is skipped.
-/// Returns the JSON and the text.
+/// Reads a model, of a glTF, FBX or 3MF file also what becomes a scene by default and what is
+/// skipped. Returns the JSON and the text.
 pub(super) fn tell(path: &Path, as_json: bool) -> Result<(Value, String), Failure> {
     let progress = Progress::new(as_json);
     let wanted = Wanted { groups: true, ..Wanted::default() };

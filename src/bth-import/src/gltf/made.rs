@@ -133,8 +133,8 @@ impl Made {
 
     /// The view of all bytes from `start` on.
     fn view_from(&mut self, start: usize) -> usize {
-        let byte_length = (self.bytes.len() - start) as u64;
-        self.document.buffer_views.push(BufferView::at(start as u64, byte_length));
+        let (byte_offset, byte_length) = (start as u64, (self.bytes.len() - start) as u64);
+        self.document.buffer_views.push(BufferView { byte_offset, byte_length, ..BufferView::default() });
         self.document.buffer_views.len() - 1
     }
 

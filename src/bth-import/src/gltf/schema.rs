@@ -174,13 +174,6 @@ pub(super) struct BufferView {
     pub(super) extensions: Extensions,
 }
 
-impl BufferView {
-    /// A view of bytes of the first buffer.
-    pub(super) fn at(byte_offset: u64, byte_length: u64) -> BufferView {
-        BufferView { byte_offset, byte_length, ..BufferView::default() }
-    }
-}
-
 /// EXT_meshopt_compression or KHR_meshopt_compression of a buffer view: where its stream is and
 /// what it holds.
 #[derive(Deserialize)]

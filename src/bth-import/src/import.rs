@@ -82,7 +82,7 @@ pub fn import_gltf_parts_bytes(
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(name, data, monitor);
     if !format(&source)?.is_scene() {
-        let message = "expected a glTF, GLB, FBX or 3MF file, of which single meshes can be named";
+        let message = "expected a glTF, GLB, FBX or 3MF file, whose meshes can be named";
         return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));
     }
     let file = GltfFile::open(&source, Use::Parts, wanted.polygons)?;

@@ -11,7 +11,7 @@ use crate::gltf::threemf::EXPORT;
 use crate::gltf::threemf::part::Part;
 use crate::source::{MALFORMED, Source, UNSUPPORTED};
 
-/// Unzipped bytes that the parts may have for each byte of the package, and besides.
+/// Unzipped bytes that the parts may have: for each byte of the package, and in addition.
 const BYTES_PER_BYTE: u64 = 256;
 const FREE_BYTES: u64 = 1 << 24;
 /// Bytes of memory that a byte of a part takes at most until it is read.

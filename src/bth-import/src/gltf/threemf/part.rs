@@ -107,7 +107,7 @@ impl Part<'_> {
                     return Err(self.error(
                         TRUNCATED,
                         at,
-                        "expected the end of an element, found that of the part",
+                        "expected the end of an element, found the end of the part",
                     ));
                 }
                 Event::Eof => break,

@@ -39,7 +39,8 @@ def convert(stage, folder, *, subdivision=0):
 
     stage: a path, or a pxr.Usd.Stage. subdivision: levels of Catmull-Clark subdivision; 0 shows control cages.
 
-    Meshes, simple shapes, transforms and visibility over time, point instancers and instances (as groups), cameras, lights and preview
+    Meshes, also as skins, blend shapes and time samples move them, simple shapes, transforms and
+    visibility over time, point instancers and instances (as groups), cameras, lights and preview
     materials with their textures are kept. What is not kept is counted in `dropped`.
     """
     levels = int(subdivision)

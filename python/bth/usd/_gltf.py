@@ -40,7 +40,7 @@ class Library:
     def image(self, name, data):
         """The index of an image file, which is written next to the model."""
         def write():
-            stem, ending = os.path.splitext(os.path.basename(name))
+            stem, ending = os.path.splitext(os.path.basename(name.rstrip("]")))
             file = f"{self.name}-{len(self.images)}{ending.lower()}"
             with open(os.path.join(self._folder, file), "wb") as to:
                 to.write(data)

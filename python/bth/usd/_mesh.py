@@ -29,7 +29,11 @@ class Polygons:
 
 def _array(attribute, time, kind, width=None):
     """The values of an attribute; none where they are of another type than its schema says."""
-    values = attribute.Get(time)
+    return array(attribute.Get(time), kind, width)
+
+
+def array(values, kind, width=None):
+    """Values of USD as numbers, or rows of them; none where they are something else."""
     shape = (0, width) if width else (0,)
     try:
         values = np.array(values if values is not None else np.zeros(shape), kind)
@@ -57,10 +61,12 @@ def at_corners(primvar, polygons, time, width):
     return values[rows]
 
 
-def mesh(prim, time, levels, names, dropped):
-    """The faces of a Mesh, with the primvars of these names and normals; None without faces that can be used."""
+def mesh(prim, points, time, levels, names, dropped):
+    """The faces of a Mesh over points (v, 3), with the primvars of these names and normals.
+
+    None without faces that can be used.
+    """
     of = UsdGeom.Mesh(prim)
-    points = _array(of.GetPointsAttr(), time, np.float64, 3)
     counts = _array(of.GetFaceVertexCountsAttr(), time, np.int64)
     indices = _array(of.GetFaceVertexIndicesAttr(), time, np.int64)
     if not len(counts) or counts.min() < 0 or counts.sum() != len(indices) or (len(indices) and not (
@@ -89,6 +95,16 @@ def mesh(prim, time, levels, names, dropped):
     elif scheme not in ("none", "bilinear", "catmullClark"):
         dropped[f"{scheme} subdivision: control cages are shown"] += 1
     return _without_holes(of, polygons, faces, time), scheme
+
+
+def refined(prim, points, time, levels):
+    """The points that `mesh` has for these points of a Mesh."""
+    of = UsdGeom.Mesh(prim)
+    if not levels or (of.GetSubdivisionSchemeAttr().Get() or "catmullClark") != "catmullClark":
+        return points
+    counts = _array(of.GetFaceVertexCountsAttr(), time, np.int64)
+    indices = _array(of.GetFaceVertexIndicesAttr(), time, np.int64)
+    return _subdivided(of, Polygons(points, counts, indices), time, levels)[0].points
 
 
 def _normals(of, polygons, time):
@@ -127,13 +143,14 @@ def _subdivided(of, polygons, time, levels):
 
 
 def _without_holes(of, polygons, faces, time):
-    """Triangles: positions and values (t, 3, k), and the face of the source of each."""
+    """Points, and triangles: rows of points (t, 3), values (t, 3, k), and the source's faces."""
     corners, face = polygons.triangles()
     if (of.GetOrientationAttr().Get() or "rightHanded") == "leftHanded":
         corners = corners[:, ::-1]
     kept = ~np.isin(faces[face], _array(of.GetHoleIndicesAttr(), time, np.int64))
     corners, face = corners[kept], faces[face[kept]]
-    return polygons.points[polygons.indices[corners]], {n: v[corners] for n, v in polygons.values.items()}, face
+    values = {n: v[corners] for n, v in polygons.values.items()}
+    return polygons.points, polygons.indices[corners], values, face
 
 
 def shape(prim, time):

@@ -7,9 +7,9 @@ import math
 import os
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade  # type: ignore[import-untyped]
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel  # type: ignore[import-untyped]
 
-from . import _mesh
+from . import _mesh, _move
 from ._gltf import Library
 from ._look import Looks
 
@@ -24,10 +24,11 @@ class Converter:
     """Walks a stage and collects the tables of a manifest."""
 
     def __init__(self, stage, folder, name, levels):
-        self._stage, self._levels = stage, levels
+        self._stage, self._folder, self._levels = stage, folder, levels
         self.dropped = collections.Counter()
         self._library = Library(folder, name)
         self._looks = Looks(self._library, self.dropped)
+        self._skins = _move.Skins(self.dropped)
         self.objects, self.nodes, self.tracks, self.cameras, self.lights = [], [], [], [], []
         self._groups, self._object_of = {}, {}
         # Of the world or the group that is walked: its outermost node, and what its nodes' names begin with.
@@ -42,8 +43,8 @@ class Converter:
         if self.last - self.first >= _FRAMES:
             self.dropped[f"frames after the first {_FRAMES:,}"] += self.last - self.first + 1 - _FRAMES
             self.last = self.first + _FRAMES - 1
-        if not -(2**31) <= self.first <= self.last < 2**31:
-            self.dropped["ranges of time codes beyond 32 bits"] += 1
+        if not -(2**24) <= self.first <= self.last <= 2**24:
+            self.dropped["ranges of time codes beyond 24 bits"] += 1
             self.first = self.last = 0
         self._codes = [Usd.TimeCode(t) for t in range(self.first, self.last + 1)]
         self._time = Usd.TimeCode(start) if stage.HasAuthoredTimeCodeRange() else Usd.TimeCode.EarliestTime()
@@ -87,7 +88,10 @@ class Converter:
         elif imageable and imageable.GetVisibilityAttr().HasAuthoredValue():
             self.nodes.append({"name": self._name(prim), **({"parent": parent} if parent else {})})
             node = self._visibility(imageable)
-        if prim.IsInstance():
+        if prim.IsA(UsdSkel.Root):
+            self._skins.find(prim)
+        # A SkelRoot, or what is below one, may have another pose in each instance.
+        if prim.IsInstance() and not self._skins.are_in(prim):
             prototype = prim.GetPrototype()
             self._show(node, prototype, group, depth, is_prototype=True)
             return
@@ -95,7 +99,7 @@ class Converter:
             self._instancer(UsdGeom.PointInstancer(prim), node, group, depth)
             return
         self._content(prim, kind, node, group)
-        for child in prim.GetChildren():
+        for child in prim.GetFilteredChildren(Usd.TraverseInstanceProxies()):
             self._walk(child, node, group, depth)
 
     def _name(self, prim):
@@ -147,8 +151,8 @@ class Converter:
         name = self._group(prim, depth, is_prototype)
         if name is None:
             return
-        row = {"name": f"{node}#{len(self.nodes)}", "group": name, "parent": node}
-        self.nodes.append(row)
+        row = {"name": f"{node}#{len(self.nodes)}", "group": name}
+        self.nodes.append(row | ({"parent": node} if node else {}))
         if group is not None:
             group.add("instance")
 
@@ -246,30 +250,66 @@ class Converter:
         color = self._constant_color(prim)
         looks = [(material, *self._looks.of(material, double_sided, color), faces) for material, faces in [(of_whole, None), *parts]]
         if kind != "Mesh":
+            if self._skins.is_on(prim):
+                self.dropped["skins of simple shapes: shown as they were bound"] += 1
             rows = _mesh.shape(prim, time)
             self._shown(node, self._object([(np.asarray(rows, np.float32), {}, looks[0][1])]), group)
             return
-        if len(self._codes) > 1 and UsdGeom.Mesh(prim).GetPointsAttr().ValueMightBeTimeVarying():
-            self.dropped["meshes whose points move: shown at the first frame"] += 1
-        if prim.HasRelationship("skel:skeleton") or prim.HasAttribute("primvars:skel:jointIndices"):
-            self.dropped["skins: shown as they were bound"] += 1
+        points = _mesh.array(self._skins.points(prim, time), np.float64, 3)
         names = ["displayColor", *sorted({name for _, _, name, _ in looks if name} - {"displayColor"})]
-        found = _mesh.mesh(prim, time, self._levels, names, self.dropped)
+        found = _mesh.mesh(prim, points, time, self._levels, names, self.dropped)
         if found is None:
             return
-        (positions, values, face), scheme = found
+        (points, rows, values, face), scheme = found
         if scheme == "catmullClark" and not self._levels:
             self.dropped["subdivision surfaces: control cages are shown (hint: subdivision=2)"] += 1
         owner = np.zeros(int(face.max(initial=-1)) + 1, np.int64)
         for k, (*_, faces) in enumerate(looks[1:], 1):
             owner[faces[(faces >= 0) & (faces < len(owner))]] = k
+        is_posed = self._skins.is_on(prim)
+        if is_posed and values.pop("normals", None) is not None:
+            self.dropped["normals of meshes with skins"] += 1
         primitives = []
         for k, (material, row, uv, _) in enumerate(looks):
             chosen = owner[face] == k
             if chosen.any():
-                primitives.append((np.asarray(positions[chosen], np.float32), self._attributes(values, chosen, uv, material), row))
-        if primitives:
-            self._shown(node, self._object(primitives), group)
+                attributes = self._attributes(values, chosen, uv, material)
+                primitives.append((rows[chosen], attributes, row))
+        if not primitives:
+            return
+        moves = is_posed or UsdGeom.Mesh(prim).GetPointsAttr().ValueMightBeTimeVarying()
+        name = self._moving(prim, points, primitives) if moves and len(self._codes) > 1 else None
+        if name is None:
+            place = lambda rows: np.asarray(points[rows], np.float32)
+            name = self._object([(place(rows), *others) for rows, *others in primitives])
+        self._shown(node, name, group)
+
+    def _moving(self, prim, points, primitives):
+        """The name of the object of a mesh that moves; None if it stays, or its faces change."""
+        name = f"{self._library.name}-moving-{sum('vertex_cache' in row for row in self.objects)}"
+        path = os.path.join(self._folder, name)
+        frames = self._frames(prim)
+        moves = _move.write_cache(f"{path}.pc2", frames, len(points), self.first, len(self._codes))
+        if moves is None:
+            why = "meshes whose faces or number of points change: shown at the first frame"
+            self.dropped[why] += 1
+        if not moves:
+            return None
+        look = _move.write_model(path, points, primitives, self._library, self.dropped)
+        row = {"name": name, "model": f"{name}.obj", "vertex_cache": f"{name}.pc2"}
+        self.objects.append(row | look)
+        return name
+
+    def _frames(self, prim):
+        """The points of a mesh in each frame; None where its faces are not those of the first."""
+        of = UsdGeom.Mesh(prim)
+        faces = of.GetFaceVertexCountsAttr(), of.GetFaceVertexIndicesAttr(), of.GetHoleIndicesAttr()
+        faces = [attribute for attribute in faces if attribute.ValueMightBeTimeVarying()]
+        first = [a.Get(self._time) for a in faces]
+        for code in self._codes:
+            same = [a.Get(code) for a in faces] == first
+            points = _mesh.array(self._skins.points(prim, code), np.float64, 3)
+            yield _mesh.refined(prim, points, self._time, self._levels) if same else None
 
     def _constant_color(self, prim):
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")

@@ -1,25 +1,41 @@
 """Compares scenes that bth.usd makes with what USD itself says: usd.py FOLDER
 
 Of each stage in the folder (usd, usda, usdc, usdz) the triangles of all meshes are placed by USD, instance by instance, without groups.
-Their box and number have to be those of the compiled scene. Other prims, point instancers and subdivision are not compared.
+Their box and number have to be those of the compiled scene, at the first frame and one in the middle.
+USD bakes skins for that. Other prims, point instancers and subdivision are not compared.
 """
 
-import os
+import collections
 import sys
 import tempfile
 import warnings
 from pathlib import Path
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Gf, Tf, Usd, UsdGeom, UsdSkel
 
 import bth
 import bth.usd
 
 
-def placed(stage):
+def baked(file, time):
+    """A stage without instances, with its skins applied, also at this time."""
+    stage = Usd.Stage.Open(str(file))
+    stage.SetEditTarget(stage.GetSessionLayer())
+    # Else times would be scaled.
+    stage.SetTimeCodesPerSecond(stage.GetTimeCodesPerSecond())
+    while instances := [prim for prim in stage.Traverse() if prim.IsInstance()]:
+        for prim in instances:
+            prim.SetInstanceable(False)
+    # Samples are where animations have some, and at the frames of the stage.
+    stage.SetStartTimeCode(time)
+    stage.SetEndTimeCode(time)
+    assert UsdSkel.BakeSkinning(Usd.PrimRange(stage.GetPseudoRoot()), Gf.Interval.GetFullInterval())
+    return stage
+
+
+def placed(stage, time):
     """The box around the faces of all visible meshes, and the number of their triangles; None with what is not compared."""
-    time = Usd.TimeCode(stage.GetStartTimeCode()) if stage.HasAuthoredTimeCodeRange() else Usd.TimeCode.EarliestTime()
     lower, upper, triangles = np.full(3, np.inf), np.full(3, -np.inf), 0
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
         kind, imageable = str(prim.GetTypeName()), UsdGeom.Imageable(prim)
@@ -63,31 +79,46 @@ def shown(scene):
 
 def main(folder):
     files = sorted(f for f in Path(folder).rglob("*.usd*") if f.suffix in (".usd", ".usda", ".usdc", ".usdz"))
-    same, others, refused, wrong = 0, 0, 0, 0
+    counts = collections.Counter()
     for file in files:
         try:
             stage = Usd.Stage.Open(str(file))
         except Tf.ErrorException:
-            refused += 1
+            counts["refused by USD"] += 1
             continue
-        expected = placed(stage)
         with tempfile.TemporaryDirectory() as made, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scene = bth.compile(bth.usd.convert(stage, made).manifest, quality="fast", materials=True, cache=False)
-        if expected is None:
-            others += 1
-            continue
-        box, triangles = expected
-        found, within = shown(scene)
-        # Positions are rounded to float32 before they are placed.
-        fits = not triangles or np.abs(within - box).max() <= 2.0**-20 * np.abs(box).max()
-        if found == triangles and fits:
-            same += 1
+        everything = stage.Traverse(Usd.TraverseInstanceProxies())
+        is_skinned = any(prim.IsA(UsdSkel.Root) for prim in everything)
+        first, last, _ = scene.frames
+        times = [Usd.TimeCode.EarliestTime()]
+        if stage.HasAuthoredTimeCodeRange():
+            times = [Usd.TimeCode(stage.GetStartTimeCode())]
+        if last > first:
+            times = [Usd.TimeCode(first), Usd.TimeCode((first + last + 1) // 2)]
+        for time in times:
+            if last > first:
+                scene.set_frame(int(time.GetValue()))
+            expected = placed(baked(file, time.GetValue()) if is_skinned else stage, time)
+            if expected is None:
+                counts["compiled without a comparison"] += 1
+                break
+            box, triangles = expected
+            found, within = shown(scene)
+            # Positions are rounded to float32 before they are placed.
+            fits = not triangles or np.abs(within - box).max() <= 2.0**-20 * np.abs(box).max()
+            if found != triangles or not fits:
+                counts["different"] += 1
+                print(f"{file}, {time}: {found} triangles in {within.tolist()}")
+                print(f"    expected {triangles} in {box.tolist()}")
+                break
         else:
-            wrong += 1
-            print(f"{file}: {found} triangles in {within.tolist()}, expected {triangles} in {box.tolist()}")
-    print(f"{len(files)} stages: {same} the same, {others} compiled without a comparison, {refused} refused by USD, {wrong} different")
-    return wrong > 0
+            counts["the same"] += 1
+            counts["of them at two frames"] += last > first
+            counts["of them with skins"] += is_skinned
+    print(f"{len(files)} stages: " + ", ".join(f"{count} {what}" for what, count in counts.items()))
+    return counts["different"] > 0
 
 
 if __name__ == "__main__":

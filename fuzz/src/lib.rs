@@ -281,7 +281,7 @@ pub fn import_cache(bytes: &[u8]) {
             assert_eq!(cache.positions.len(), cache.points * cache.times.len());
         }
         let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, ..Wanted::default() };
-        let read = import_vertex_cache_bytes((model, square), (name, bytes), &timing, wanted, &Silent);
+        let read = import_vertex_cache_bytes((model, square, None), (name, bytes), &timing, wanted, &Silent);
         if let Ok((mesh, _)) = read {
             check_moving(&mesh);
         }

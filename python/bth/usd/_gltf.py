@@ -27,12 +27,14 @@ class Library:
         return self._of_key[place]
 
     def accessor(self, values):
-        """The index of an accessor of rows of two to four float32."""
-        values = np.ascontiguousarray(values, "<f4")
+        """The index of an accessor of rows of two to four float32, or of indices."""
+        are_indices = values.ndim == 1
+        values = np.ascontiguousarray(values, "<u4" if are_indices else "<f4")
         self._views.append({"buffer": 0, "byteOffset": len(self._bytes), "byteLength": values.nbytes})
         self._bytes += values.tobytes()
-        row = {"bufferView": len(self._views) - 1, "componentType": 5126, "count": len(values), "type": f"VEC{values.shape[1]}"}
-        if values.shape[1] == 3 and len(values):
+        kind, shape = (5125, "SCALAR") if are_indices else (5126, f"VEC{values.shape[1]}")
+        row = {"bufferView": len(self._views) - 1, "componentType": kind, "count": len(values), "type": shape}
+        if shape == "VEC3" and len(values):
             row |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         self._accessors.append(row)
         return len(self._accessors) - 1

@@ -225,18 +225,23 @@ class Converter:
                 made.update(name.encode() + values[name].tobytes())
         key = made.digest()
         if key not in self._object_of:
-            rows = []
-            for positions, values, material in primitives:
-                attributes = {"POSITION": self._library.accessor(positions.reshape(-1, 3))}
-                for name, rows_of in values.items():
-                    attributes[name] = self._library.accessor(rows_of.reshape(-1, rows_of.shape[-1]))
-                rows.append({"attributes": attributes, **({} if material is None else {"material": material})})
-            self._library.meshes.append({"primitives": rows})
-            number = len(self._library.meshes) - 1
-            name = f"mesh {number}"
-            self.objects.append({"name": name, "model": f"{self._library.name}.gltf", "mesh": number})
-            self._object_of[key] = name
+            row = self._model(primitives)
+            self.objects.append(row)
+            self._object_of[key] = row["name"]
         return self._object_of[key]
+
+    def _model(self, primitives):
+        """Adds a mesh of primitives, which may have indices; returns its object."""
+        rows = []
+        for positions, values, material, *indices in primitives:
+            attributes = {"POSITION": self._library.accessor(positions.reshape(-1, 3))}
+            for name, rows_of in values.items():
+                attributes[name] = self._library.accessor(rows_of.reshape(-1, rows_of.shape[-1]))
+            row = {"attributes": attributes} | ({} if material is None else {"material": material})
+            rows.append(row | {"indices": self._library.accessor(of) for of in indices})
+        number = len(self._library.meshes)
+        self._library.meshes.append({"primitives": rows})
+        return {"name": f"mesh {number}", "model": f"{self._library.name}.gltf", "mesh": number}
 
     def _geometry(self, prim, kind, node, group):
         time = self._time
@@ -286,22 +291,31 @@ class Converter:
 
     def _moving(self, prim, points, primitives):
         """The name of the object of a mesh that moves; None if it stays, or its faces change."""
-        name = f"{self._library.name}-moving-{sum('vertex_cache' in row for row in self.objects)}"
-        path = os.path.join(self._folder, name)
-        frames = self._frames(prim)
-        moves = _move.write_cache(f"{path}.pc2", frames, len(points), self.first, len(self._codes))
+        has_normals = any("NORMAL" in values for _, values, _ in primitives)
+        without = lambda values: {name: v for name, v in values.items() if name != "NORMAL"}
+        primitives = [(rows, without(values), material) for rows, values, material in primitives]
+        found = [_move.vertices(rows, values) for rows, values, _ in primitives]
+        points_of = [rows.reshape(-1)[first] for (rows, *_), (first, _) in zip(primitives, found)]
+        kept = np.concatenate(points_of)
+        cache = f"{self._library.name}-{len(self._library.meshes)}.pc2"
+        path, frames = os.path.join(self._folder, cache), self._frames(prim, len(points), kept)
+        moves = _move.write_cache(path, frames, len(kept), self.first, len(self._codes))
         if moves is None:
             why = "meshes whose faces or number of points change: shown at the first frame"
             self.dropped[why] += 1
         if not moves:
             return None
-        look = _move.write_model(path, points, primitives, self._library, self.dropped)
-        row = {"name": name, "model": f"{name}.obj", "vertex_cache": f"{name}.pc2"}
-        self.objects.append(row | look)
-        return name
+        self.dropped.update(["normals of meshes that move"] * has_normals)
+        indexed = []
+        for (_, values, material), (first, vertex), of in zip(primitives, found, points_of):
+            values = {name: v.reshape(-1, v.shape[-1])[first] for name, v in values.items()}
+            indexed.append((points[of], values, material, vertex))
+        row = self._model(indexed) | {"vertex_cache": cache}
+        self.objects.append(row)
+        return row["name"]
 
-    def _frames(self, prim):
-        """The points of a mesh in each frame; None where its faces are not those of the first."""
+    def _frames(self, prim, count, kept):
+        """The kept points of a mesh in each frame; None where faces or the count change."""
         of = UsdGeom.Mesh(prim)
         faces = of.GetFaceVertexCountsAttr(), of.GetFaceVertexIndicesAttr(), of.GetHoleIndicesAttr()
         faces = [attribute for attribute in faces if attribute.ValueMightBeTimeVarying()]
@@ -309,7 +323,8 @@ class Converter:
         for code in self._codes:
             same = [a.Get(code) for a in faces] == first
             points = _mesh.array(self._skins.points(prim, code), np.float64, 3)
-            yield _mesh.refined(prim, points, self._time, self._levels) if same else None
+            points = _mesh.refined(prim, points, self._time, self._levels) if same else points
+            yield points[kept] if same and len(points) == count else None
 
     def _constant_color(self, prim):
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")

@@ -115,8 +115,10 @@ pub enum Source {
     },
     /// A model whose vertices are moved by a vertex cache.
     Cached {
-        /// OBJ, PLY, STL or OFF file.
+        /// OBJ, glTF, GLB, PLY, STL or OFF file.
         path: String,
+        /// Number of the mesh in a glTF file; `None` for the other formats.
+        mesh: Option<u32>,
         /// PC2 or MDD file.
         cache: String,
         /// When its frames are shown.

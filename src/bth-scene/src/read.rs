@@ -10,7 +10,7 @@ use crate::node_tables::NodeTables;
 use crate::read_deformers::{DEFORMER_KEYS, SKIN_KEYS, deformers, skin};
 use crate::read_material::{color, material};
 use crate::read_path::path;
-use crate::read_sequence::{OBJECT_KEYS, sequence, vertex_cache};
+use crate::read_sequence::{OBJECT_KEYS, index, sequence, vertex_cache};
 use crate::read_tracks::{TRACK_KEYS, tracks};
 use crate::read_transform::transform;
 use crate::segments::Segments;
@@ -192,9 +192,7 @@ fn object(table: &Table<'_>) -> Result<Object> {
 
 /// The source of an object that is neither a sequence nor moved by a vertex cache.
 fn unmoved(table: &Table<'_>, deforms: bool) -> Result<Source> {
-    let index = |key| -> Result<Option<u32>> {
-        table.get(key).map(|v| v.integer(0..=i64::from(u32::MAX - 1)).map(|n| n as u32)).transpose()
-    };
+    let index = |key| index(table, key);
     Ok(match table.get("file") {
         Some(file) => Source::Compiled { path: path(&file)?, object: index("object")? },
         None => {

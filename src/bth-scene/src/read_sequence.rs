@@ -60,11 +60,16 @@ pub(crate) fn vertex_cache(table: &Table<'_>) -> Result<Option<Source>> {
         }
         return Ok(None);
     };
-    for key in ["mesh", "deforms", "joint", "node", "file", "object"] {
+    for key in ["deforms", "joint", "node", "file", "object"] {
         table.exclude("vertex_cache", key)?;
     }
     let (path, cache) = (path(&table.need("model")?)?, path(&cache)?);
-    Ok(Some(Source::Cached { path, cache, timing: timing(table)? }))
+    Ok(Some(Source::Cached { path, mesh: index(table, "mesh")?, cache, timing: timing(table)? }))
+}
+
+/// The number of a part of a file.
+pub(crate) fn index(table: &Table<'_>, key: &'static str) -> Result<Option<u32>> {
+    table.get(key).map(|v| v.integer(0..=i64::from(u32::MAX - 1)).map(|n| n as u32)).transpose()
 }
 
 fn timing(table: &Table<'_>) -> Result<SequenceTiming> {

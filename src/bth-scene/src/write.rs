@@ -33,8 +33,9 @@ impl Manifest {
                     object.map_or(Ok(()), |object| writeln!(out, "object = {object}"))?;
                 }
                 Source::Sequence { frames, timing } => write_sequence(out, frames, timing)?,
-                Source::Cached { path, cache, timing } => {
+                Source::Cached { path, mesh, cache, timing } => {
                     writeln!(out, "model = {}\nvertex_cache = {}", text(path), text(cache))?;
+                    mesh.map_or(Ok(()), |mesh| writeln!(out, "mesh = {mesh}"))?;
                     write_timing(out, timing)?;
                 }
                 Source::Deforming { path, mesh, without } => {

@@ -119,7 +119,7 @@ fn objects_whose_vertices_move_are_read() {
     );
     assert_eq!(
         source("model = \"a.obj\"\nvertex_cache = \"a.mdd\"").unwrap(),
-        Source::Cached { path: "a.obj".into(), cache: "a.mdd".into(), timing: timed(None, 0.0) }
+        Source::Cached { path: "a.obj".into(), mesh: None, cache: "a.mdd".into(), timing: timed(None, 0.0) }
     );
     for (keys, code, words) in [
         ("sequence = \"walk.ply\"", "BTH-M011", "one run of `#`"),
@@ -130,7 +130,7 @@ fn objects_whose_vertices_move_are_read() {
         ("sequence = \"a#.ply\"\nrate = 0", "BTH-M005", "above 0"),
         ("model = \"a.ply\"\nrate = 3", "BTH-M013", "belongs to objects with"),
         ("vertex_cache = \"a.pc2\"", "BTH-M006", "`model` is missing"),
-        ("model = \"a.glb\"\nvertex_cache = \"a.pc2\"\nmesh = 1", "BTH-M013", "exclude"),
+        ("model = \"a.glb\"\nvertex_cache = \"a.pc2\"\nnode = 1", "BTH-M013", "exclude"),
     ] {
         let error = source(keys).unwrap_err();
         assert!(error.to_string().contains(words), "{error}");

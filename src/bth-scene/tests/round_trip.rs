@@ -52,6 +52,7 @@ prop_compose! {
                 }),
             Object::new("cloth", Source::Cached {
                     path: "c.obj".into(),
+                    mesh: lens.1.then_some(3),
                     cache: "c.pc2".into(),
                     timing: SequenceTiming { rate: None, start: frames.2 },
                 }),

@@ -70,13 +70,33 @@ fn pc2(frames: &[Positions]) -> Vec<u8> {
     bytes
 }
 
-/// A folder with the frames as numbered OBJ files and as a PC2 file of the first one.
+/// A folder with the frames as numbered OBJ files and as a PC2 file of the first one, and of
+/// mesh 1 of a glTF file.
 pub(crate) fn folder(frames: &[Positions], triangles: &[[u32; 3]]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (number, frame) in frames.iter().enumerate() {
         std::fs::write(folder.path().join(format!("knot_{number:03}.obj")), obj(frame, triangles)).unwrap();
     }
     std::fs::write(folder.path().join("knot.pc2"), pc2(frames)).unwrap();
+    // The positions are zeros, since the cache gives others.
+    let (rows, size) = (triangles.as_flattened(), 12 * frames[0].len());
+    let mut bytes = vec![0; size];
+    bytes.extend(rows.iter().flat_map(|row| row.to_le_bytes()));
+    let gltf = json!({
+        "asset": {"version": "2.0"},
+        "meshes": [{"primitives": []}, {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"componentType": 5126, "type": "VEC3", "count": frames[0].len(), "bufferView": 0},
+            {"componentType": 5125, "type": "SCALAR", "count": rows.len(), "bufferView": 1}
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": size},
+            {"buffer": 0, "byteOffset": size, "byteLength": bytes.len() - size}
+        ],
+        "buffers": [{"uri": "knot.bin", "byteLength": bytes.len()}]
+    });
+    std::fs::write(folder.path().join("knot.gltf"), gltf.to_string()).unwrap();
+    std::fs::write(folder.path().join("knot.bin"), bytes).unwrap();
     folder
 }
 
@@ -116,6 +136,7 @@ fn sequences_have_the_answers_of_their_frames_and_of_what_lies_between() {
     let texts = [
         "objects = [{ name = \"knot\", sequence = \"knot_###.obj\", start = 1.0 }]",
         "objects = [{ name = \"knot\", model = \"knot_000.obj\", vertex_cache = \"knot.pc2\", rate = 4, start = 1 }]",
+        "objects = [{ name = \"knot\", model = \"knot.gltf\", mesh = 1, vertex_cache = \"knot.pc2\", rate = 4, start = 1 }]",
     ];
     let rng = &mut Rng::new(5);
     for text in texts {

@@ -168,18 +168,17 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
         let (mesh, summary) = MeshSummary::of(read);
         return Ok(vec![Imported { mesh, summary }]);
     }
-    if let Some(moving) = &file.moving {
-        let read = moving.import(&file.digest, context)?;
-        return Ok(vec![keep_mesh(file, SourcePart::Whole, read, context, &recording)]);
-    }
     let single: Vec<GltfPart> = parts.iter().filter_map(|part| part.gltf()).collect();
-    let meshes = if single.is_empty() {
-        vec![mesh::import(&file.full, options.wanted(), *monitor)?]
-    } else {
-        mesh::import_gltf_parts(&file.full, &single, options.wanted(), *monitor)?
+    let meshes = match &file.moving {
+        Some(moving) => vec![moving.import(context)?],
+        None if single.is_empty() => vec![mesh::import(&file.full, options.wanted(), *monitor)?],
+        None => mesh::import_gltf_parts(&file.full, &single, options.wanted(), *monitor)?,
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
-    let meshes = file.digest.unchanged(&file.full, meshes)?;
+    let meshes = match &file.moving {
+        Some(moving) => moving.unchanged(&file.digest, meshes)?,
+        None => file.digest.unchanged(&file.full, meshes)?,
+    };
     let none = Recording::new(*monitor);
     let keep = |(row, (part, read))| {
         let recording = if row == 0 { &recording } else { &none };

@@ -15,6 +15,8 @@ pub(super) struct Moving {
     files: Vec<PathBuf>,
     /// True if the second file is a vertex cache.
     is_cache: bool,
+    /// The mesh that the vertex cache moves, if the model is a glTF file.
+    mesh: Option<u32>,
     timing: Timing,
 }
 
@@ -42,13 +44,13 @@ impl Moving {
     /// # Errors
     /// The errors of [`moving_files`].
     pub(super) fn of(manifest: &Manifest, source: &Source, folder: &Path) -> Result<Option<Moving>> {
-        let (is_cache, SequenceTiming { rate, start }) = match source {
-            Source::Sequence { timing, .. } => (false, *timing),
-            Source::Cached { timing, .. } => (true, *timing),
+        let (is_cache, mesh, SequenceTiming { rate, start }) = match source {
+            Source::Sequence { timing, .. } => (false, None, *timing),
+            Source::Cached { mesh, timing, .. } => (true, *mesh, *timing),
             _ => return Ok(None),
         };
         let timing = Timing { rate, usual_rate: manifest.frames.rate, start };
-        Ok(Some(Moving { files: moving_files(source, folder)?, is_cache, timing }))
+        Ok(Some(Moving { files: moving_files(source, folder)?, is_cache, mesh, timing }))
     }
 
     /// The first of the files.
@@ -71,24 +73,30 @@ impl Moving {
     /// What the mesh depends on besides the contents of the files.
     pub(super) fn part(&self) -> String {
         let kind = if self.is_cache { "vertex cache" } else { "sequence" };
+        let mesh = self.mesh.map_or_else(String::new, |mesh| format!(" of mesh {mesh}"));
         let Timing { rate, usual_rate, start } = self.timing;
-        format!("{kind} rate {rate:?} of {usual_rate:?} start {start:?} motion {}", pipeline::MOTION)
+        format!("{kind}{mesh} rate {rate:?} of {usual_rate:?} start {start:?} motion {}", pipeline::MOTION)
     }
 
-    /// Reads the mesh with its frames. `digest` is what [`Self::digest`] gave before.
+    /// Reads the mesh with its frames.
     ///
     /// # Errors
-    /// Errors of the import; `BTH-O002` when a file has changed since it was hashed.
-    pub(super) fn import(
-        &self,
-        digest: &SourceDigest,
-        context: &Context<'_>,
-    ) -> Result<(Mesh, mesh::Report)> {
-        let (wanted, monitor) = (context.options.wanted(), context.monitor);
-        let read = match (self.is_cache, &self.files[..]) {
-            (true, [model, cache]) => mesh::import_vertex_cache(model, cache, &self.timing, wanted, monitor)?,
-            _ => mesh::import_sequence(&self.files, &self.timing, wanted, monitor)?,
-        };
+    /// Errors of the import.
+    pub(super) fn import(&self, context: &Context<'_>) -> Result<(Mesh, mesh::Report)> {
+        let (timing, wanted, monitor) = (&self.timing, context.options.wanted(), context.monitor);
+        Ok(match (self.is_cache, &self.files[..]) {
+            (true, [model, cache]) => {
+                mesh::import_vertex_cache((model, self.mesh), cache, timing, wanted, monitor)?
+            }
+            _ => mesh::import_sequence(&self.files, timing, wanted, monitor)?,
+        })
+    }
+
+    /// Returns what was read if the files still have these hashes.
+    ///
+    /// # Errors
+    /// `BTH-O002` when a file has changed since it was hashed.
+    pub(super) fn unchanged<T>(&self, digest: &SourceDigest, read: T) -> Result<T> {
         let same = self.digest(digest.looks)? == *digest;
         if same { Ok(read) } else { Err(changed(self.first())) }
     }

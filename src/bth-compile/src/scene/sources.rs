@@ -40,6 +40,7 @@ impl SourcePart {
             Source::AtRest { node, .. } => SourcePart::Gltf(GltfPart::AtRest(node)),
             // Those named as a whole that are still there have one object.
             Source::Compiled { object, .. } => SourcePart::Object(object.unwrap_or(0)),
+            Source::Cached { mesh: Some(mesh), .. } => SourcePart::Gltf(GltfPart::Mesh(mesh)),
             Source::Sequence { .. } | Source::Cached { .. } => SourcePart::Whole,
         }
     }

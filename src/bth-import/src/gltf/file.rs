@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::gltf::container::split;
 use crate::gltf::extensions::{Use, VISIBILITY, unsupported_extension};
 use crate::gltf::made::MadeFormat;
-use crate::gltf::schema::{GltfDocument, GltfNode, Visibility};
+use crate::gltf::schema::{GltfDocument, GltfMesh, GltfNode, Visibility};
 use crate::mesh::Polygons;
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
 use crate::text::shown;
@@ -172,6 +172,14 @@ impl GltfDocument {
             }
         }
         parents
+    }
+
+    /// Returns true if joints or morph targets can move a mesh.
+    pub(crate) fn is_deformed(&self, mesh: usize) -> bool {
+        let has_joints = |mesh: &GltfMesh| {
+            mesh.primitives.iter().any(|primitive| primitive.attributes.contains_key("JOINTS_0"))
+        };
+        self.has_targets(mesh) || self.meshes.get(mesh).is_some_and(has_joints)
     }
 
     /// Returns true if a mesh has morph targets.

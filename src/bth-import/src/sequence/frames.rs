@@ -2,7 +2,12 @@
 
 use super::{MISMATCH, Timing, check_times, read_vertex_cache};
 use crate::error::{Error, Result};
-use crate::formats::format;
+use crate::formats::{GLTF, format};
+use crate::gltf::GltfPart;
+use crate::gltf::extensions::Use;
+use crate::gltf::file::GltfFile;
+use crate::gltf::flatten::read_part;
+use crate::gltf::materials::SharedMaterials;
 use crate::import::{Frames, finish};
 use crate::mesh::{Keep, Mesh, Report, Wanted};
 use crate::monitor::Monitor;
@@ -16,7 +21,7 @@ struct Role(&'static str, &'static str);
 const FRAME: Role = Role("a frame of a sequence", "glTF has animations of its own: use it as a model");
 const MODEL: Role = Role(
     "the model of a vertex cache",
-    "export the model in one of these formats, or bake the animation into glTF",
+    "of a glTF file name one mesh by its number, or export the model in one of these formats",
 );
 
 /// Reads the frames of a sequence: OBJ, PLY, STL or OFF files of the same faces over as many
@@ -121,22 +126,42 @@ fn check_topology(source: &Source<'_>, first: &Path, expected: &Raw<'_>, found: 
     }
 }
 
+/// Reads a mesh of a glTF file that nothing but a vertex cache moves. Its vertices are the rows of
+/// POSITION of its primitives of triangles, one primitive after the other.
+fn read_mesh<'a>(source: &'a Source<'a>, mesh: u32, wanted: Wanted) -> Result<Raw<'a>> {
+    if format(source)?.name != GLTF.name {
+        let message = "expected a glTF or GLB file, whose meshes have numbers";
+        return Err(source.error(UNSUPPORTED, message, "leave out the number of the mesh"));
+    }
+    let file = GltfFile::open(source, Use::Parts, wanted.polygons)?;
+    if file.document.is_deformed(mesh as usize) {
+        let message = format!("expected a mesh without joints and morph targets, found mesh {mesh}");
+        return Err(source.error(UNSUPPORTED, message, "leave out the vertex cache, or export without them"));
+    }
+    let shared = SharedMaterials::default();
+    let raw = read_part(source, &file, GltfPart::Mesh(mesh), wanted, &shared);
+    shared.report(source);
+    raw.map_err(|e| e.of_model(source.path))
+}
+
 /// Reads a model and the vertex cache (PC2 or MDD) that moves its vertices. Both have the vertices
-/// in the same order. The positions in the model's file have no effect.
+/// in the same order. The positions in the model's file have no effect. Of a glTF file one mesh is
+/// read, whose vertices are the rows of POSITION of its primitives of triangles, one primitive
+/// after the other.
 ///
 /// # Errors
 /// The errors of [`import`](crate::import()) and [`read_vertex_cache`]; `BTH-I017` where the cache
-/// has another number of vertices, and `BTH-I006` for a glTF model, whose vertices have no order
-/// that is known to programs that write vertex caches.
+/// has another number of vertices, and `BTH-I006` for a glTF file without the number of a mesh, or
+/// with one that has joints or morph targets.
 pub fn import_vertex_cache(
-    model: &Path,
+    (model, mesh): (&Path, Option<u32>),
     cache: &Path,
     timing: &Timing,
     wanted: Wanted,
     monitor: &dyn Monitor,
 ) -> Result<(Mesh, Report)> {
     let (model_data, cache_data) = (read_file(model)?, read_file(cache)?);
-    import_vertex_cache_bytes((model, &model_data), (cache, &cache_data), timing, wanted, monitor)
+    import_vertex_cache_bytes((model, &model_data, mesh), (cache, &cache_data), timing, wanted, monitor)
 }
 
 /// Does the same as [`import_vertex_cache`] with the names and the bytes of both files.
@@ -144,7 +169,7 @@ pub fn import_vertex_cache(
 /// # Errors
 /// The same as [`import_vertex_cache`].
 pub fn import_vertex_cache_bytes(
-    (model, model_data): (&Path, &[u8]),
+    (model, model_data, mesh): (&Path, &[u8], Option<u32>),
     (cache, cache_data): (&Path, &[u8]),
     timing: &Timing,
     wanted: Wanted,
@@ -152,7 +177,10 @@ pub fn import_vertex_cache_bytes(
 ) -> Result<(Mesh, Report)> {
     monitor.stage("import", Some((model_data.len() + cache_data.len()) as u64));
     let source = Source::new(model, model_data, monitor);
-    let raw = read_single(&source, wanted, MODEL)?;
+    let raw = match mesh {
+        Some(mesh) => read_mesh(&source, mesh, wanted)?,
+        None => read_single(&source, wanted, MODEL)?,
+    };
     let found = read_vertex_cache(cache, cache_data, timing, monitor)?;
     let vertices = raw.positions.len();
     if found.points != vertices {

@@ -1,7 +1,9 @@
 //! Meshes whose vertices move: numbered files, PC2 and MDD.
 
+use super::gltf::Model;
 use super::*;
 use bth_import::{Polygons, Timing, import_sequence, import_vertex_cache, read_vertex_cache, sequence_files};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 const TIMING: Timing = Timing { rate: Some(10.0), usual_rate: 24.0, start: 0.5 };
@@ -220,7 +222,7 @@ fn a_vertex_cache_moves_the_vertices_of_its_model() {
         ],
     );
     let (mesh, report) =
-        import_vertex_cache(&paths[0], &paths[1], &untimed, Wanted::default(), &Silent).unwrap();
+        import_vertex_cache((&paths[0], None), &paths[1], &untimed, Wanted::default(), &Silent).unwrap();
     assert_eq!(report.format, "obj and mdd");
     assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
     assert_eq!(mesh.positions, still);
@@ -228,11 +230,58 @@ fn a_vertex_cache_moves_the_vertices_of_its_model() {
         mesh.sequence.unwrap().positions[6..],
         [moved[6], moved[7], moved[8], moved[9], moved[11], moved[10]]
     );
-    let error = import_vertex_cache(&paths[0], &paths[2], &untimed, Wanted::default(), &Silent)
+    let error = import_vertex_cache((&paths[0], None), &paths[2], &untimed, Wanted::default(), &Silent)
         .unwrap_err()
         .to_string();
     assert!(
         error.contains("b.pc2: BTH-I017: expected the 6 vertices of") && error.contains("found 5"),
         "{error}"
     );
+}
+
+/// The mesh has two triangles, whose primitives have lines between them.
+#[test]
+fn a_vertex_cache_moves_the_primitives_of_a_gltf_mesh_one_after_the_other() {
+    let meshes = json!([
+        {"primitives": []},
+        {"primitives": [
+            {"attributes": {"POSITION": 0}},
+            {"attributes": {"POSITION": 0}, "mode": 1},
+            {"attributes": {"POSITION": 0}, "indices": 1}
+        ]},
+        {"primitives": [{"attributes": {"POSITION": 0}, "targets": [{"POSITION": 0}]}]},
+        {"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 2}}]}
+    ]);
+    let model = Model::new(json!({ "meshes": meshes })).rows(&[[9.0f32; 3]; 3]);
+    let model = model.rows(&[[2u16], [0], [1]]).rows(&[[0u8; 4]; 3]);
+    let moved: Vec<[f32; 3]> = (0..12).map(|i| [i as f32, (i * i) as f32, 0.0]).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let files = [
+        ("a.glb", &model.glb()[..]),
+        ("a.obj", frame(0.0).as_bytes()),
+        ("a.pc2", &pc2(6, &moved, 0.0, 1.0)),
+        ("b.pc2", &pc2(9, &[[0.0; 3]; 9], 0.0, 1.0)),
+    ];
+    let paths = write(folder.path(), &files);
+    let wanted = Wanted { groups: true, ..Wanted::default() };
+    let read = |model: usize, mesh, cache: usize| {
+        import_vertex_cache((&paths[model], mesh), &paths[cache], &TIMING, wanted, &Silent)
+    };
+    let (mesh, report) = read(0, Some(1), 2).unwrap();
+    assert_eq!((&*report.format, report.frames, report.skipped), ("gltf and pc2", 2, 1));
+    assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+    let row = |frame: usize| [0, 1, 2, 5, 3, 4].map(|row| moved[6 * frame + row]);
+    assert_eq!(mesh.sequence.unwrap().positions, [row(0), row(1)].concat());
+    assert_eq!(mesh.groups.unwrap().groups.len(), 2);
+    for (model, mesh, cache, words) in [
+        (0, Some(1), 3, "expected the 6 vertices of"),
+        (0, None, 2, "of a glTF file name one mesh by its number"),
+        (0, Some(2), 2, "without joints and morph targets, found mesh 2"),
+        (0, Some(3), 2, "without joints and morph targets, found mesh 3"),
+        (0, Some(4), 2, "expected a mesh below 4, found 4"),
+        (1, Some(0), 2, "leave out the number of the mesh"),
+    ] {
+        let error = read(model, mesh, cache).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
 }

@@ -2,7 +2,7 @@
 //! are here.
 
 use crate::rays::View;
-use crate::{compare, load, paper, records, scenes, speed, stress, truth};
+use crate::{compare, load, records, scenes, speed, stress, truth};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -34,8 +34,6 @@ pub(crate) enum Command {
     Load(load::Load),
     /// Scenes that move and objects that deform: updates and rays, ours and Embree's.
     Scenes(scenes::Scenes),
-    /// The paper's tables on our models.
-    Paper(paper::Paper),
     /// One start in a separate process; `load` calls this.
     #[command(hide = true)]
     Probe(load::Probe),

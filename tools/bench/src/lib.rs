@@ -17,7 +17,6 @@ pub mod model;
 mod moller_trumbore;
 mod names;
 mod output;
-mod paper;
 pub mod rays;
 mod records;
 mod report;
@@ -65,7 +64,6 @@ fn measure(command: &Command) -> Result<(Report, &RunOptions)> {
         Command::Load(arguments) => (load::measure(arguments)?, &arguments.run),
         Command::Scenes(arguments) => (scenes::measure(arguments)?, &arguments.run),
         Command::Truth(arguments) => (truth::measure(arguments)?, &arguments.run),
-        Command::Paper(arguments) => (paper::measure(arguments)?, &arguments.run),
-        _ => bail!("expected a command that makes a report: speed, truth, stress, load, scenes or paper"),
+        _ => bail!("expected a command that makes a report: speed, truth, stress, load or scenes"),
     })
 }

@@ -16,7 +16,6 @@
 #![warn(missing_docs)]
 
 pub mod cached;
-pub mod comparison;
 pub mod coordinates;
 pub mod free;
 pub mod jobs;

@@ -1,6 +1,6 @@
 //! Settings for experts, by name: `bthc compile --set KEY=VALUE`, `settings` in Python.
 
-use crate::costs::{Estimator, OptimizeFor, Probe, Select};
+use crate::costs::{OptimizeFor, Probe};
 use crate::pipeline::CompileOptions;
 use std::fmt::Write;
 use std::time::Duration;
@@ -17,21 +17,12 @@ struct Key {
     apply: fn(&str, &mut CompileOptions) -> Result<(), String>,
 }
 
-const KEYS: [Key; 10] = [
+const KEYS: [Key; 8] = [
     Key {
         name: "c-tet",
         values: "NANOSECONDS",
         about: "assumed time of a step through a tetrahedron; less makes more tetrahedra",
         apply: |text, options| set(&mut options.costs.c_tet, positive(text).map(Some)),
-    },
-    Key {
-        name: "estimator",
-        values: "face-count|average-depth",
-        about: "how the steps of a ray through tetrahedra are estimated",
-        apply: |text, options| {
-            let values = [("face-count", Estimator::FaceCount), ("average-depth", Estimator::AverageDepth)];
-            set(&mut options.costs.estimator, one_of(text, &values))
-        },
     },
     Key {
         name: "free-reach",
@@ -70,15 +61,6 @@ const KEYS: [Key; 10] = [
         about: "drop tetrahedra that save no time for sampled rays, or keep them all",
         apply: |text, options| {
             set(&mut options.costs.probe, one_of(text, &[("steps", Probe::Steps), ("off", Probe::Off)]))
-        },
-    },
-    Key {
-        name: "select",
-        values: "best|paper",
-        about: "tetrahedralize what saves most time of all rays, or follow the paper's rule",
-        apply: |text, options| {
-            let values = [("best", Select::Best), ("paper", Select::Paper)];
-            set(&mut options.costs.select, one_of(text, &values))
         },
     },
     Key {

@@ -28,7 +28,7 @@ fn weights_decide_what_is_tetrahedralized() {
     assert!(all > 1000, "{json:#}");
     assert_eq!(json["report"]["probe"]["leaves"][0]["kept"], true);
     // Rays from outside and from surfaces walk through the tetrahedra.
-    for setting in ["optimize-for=camera", "optimize-for=secondary", "select=paper"] {
+    for setting in ["optimize-for=camera", "optimize-for=secondary"] {
         assert_eq!(triangles(&compile(&["--set", setting])), all, "{setting}");
     }
 }

@@ -1,11 +1,9 @@
-//! The selection: the paper's rule, or the choice of min expected time.
+//! The selection: the nodes of min expected time.
 
 use super::bottom_up::Candidates;
 use super::gains::{Gain, Sampled, sample};
 use super::options::{Choice, CostOptions, CostReport, Select, SelectionOutcome, Verdict};
 use super::prices::Prices;
-use super::subtree_sums::depths;
-use super::top_down;
 use crate::marks::Marks;
 use bth_bvh::BinaryBvh;
 use bth_bvh::sampling::KnownRays;
@@ -31,7 +29,6 @@ pub fn choose(
     }
     let prices = Prices::new(options);
     let (mut choice, cost_bvh, mut cost_with_tets) = match &options.select {
-        Select::Paper => top_down::choose(bvh, marks, options, &prices, monitor)?,
         Select::Best => best(mesh, bvh, marks, options, &prices, monitor)?,
         Select::Nodes(nodes) => (Choice { chosen: nodes.clone(), verdicts: Vec::new() }, 0.0, 0.0),
     };
@@ -97,8 +94,7 @@ fn best(
     let weights = options.rays.as_deref().map_or(options.optimize_for.weights(), KnownRays::shares);
     let sampled: Sampled = sample(mesh, bvh, options);
     monitor.check()?;
-    let depths = depths(bvh, &top, &nodes);
-    let gains = sampled.gains(bvh, &depths, &nodes, prices, weights);
+    let gains = sampled.gains(bvh, &nodes, prices, weights);
     let rows = Candidates { bvh, nodes: &nodes, gains: &gains }.best();
     let chosen: Vec<u32> = rows.iter().map(|&k| nodes[k]).collect();
     let saved: f64 = rows.iter().map(|&k| gains[k].saved).sum();
@@ -123,7 +119,7 @@ fn best(
 }
 
 /// The nodes of at least this many triangles and their smaller children, ascending.
-pub(super) fn nodes_from(bvh: &BinaryBvh, triangles: u32) -> Vec<u32> {
+fn nodes_from(bvh: &BinaryBvh, triangles: u32) -> Vec<u32> {
     let (mut nodes, mut i) = (Vec::new(), 0);
     while i < bvh.nodes.len() {
         nodes.push(i as u32);

@@ -5,7 +5,7 @@
 //! through the tetrahedra, too. So the saving of a node is a sum over rays, and the savings of
 //! disjoint nodes add up.
 
-use super::Start;
+use super::estimate::{Start, steps};
 use super::options::CostOptions;
 use super::prices::{LINES_THAT_HIT, Prices};
 use bth_bvh::BinaryBvh;
@@ -103,12 +103,10 @@ impl Sampled {
         before(nodes.end) - before(nodes.start)
     }
 
-    /// The gains of these nodes, which are ascending; `depths` are the sums of the depths of their
-    /// leaves. `weights` are the weights of rays from outside and from surfaces.
+    /// The gains of these nodes, which are ascending. `weights` are the weights of rays from outside and from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,
-        depths: &[u64],
         nodes: &[u32],
         prices: &Prices<'_>,
         weights: [f64; 2],
@@ -116,10 +114,7 @@ impl Sampled {
         let costs = prices.bvh();
         let mut gains: Vec<Gain> = Vec::with_capacity(nodes.len());
         let mut started = vec![0u32; nodes.len()];
-        let steps = |start: Start, k: usize| {
-            let count = bvh.nodes[nodes[k] as usize].count;
-            prices.steps(start, count, depths[k] as f64 / f64::from(count))
-        };
+        let steps = |start: Start, k: usize| steps(start, bvh.nodes[nodes[k] as usize].count);
         gains.resize(nodes.len(), Gain::default());
         for (ray, row, traced) in &self.surface {
             let bvh_time = costs.ray + costs.surface * f64::from(traced.visits);

@@ -1,11 +1,9 @@
 //! Selection of the suitable nodes to tetrahedralize, by the expected cost of rays.
 //!
 //! `profile` holds the measured costs of tracing on a machine. `tet_walk` counts steps of
-//! [sample rays](bth_bvh::sampling); `estimate` and `area` predict the steps without tracing.
-//! `choose` selects nodes, by the paper's rule (`top_down`) or by max saving (`gains`,
-//! `bottom_up`). `probe` decides again with sampled rays when the tetrahedra are built.
+//! [sample rays](bth_bvh::sampling); `estimate` predicts the steps without tracing. `choose`
+//! selects the nodes of max saving (`gains`, `bottom_up`). `probe` decides again with sampled rays when the tetrahedra are built.
 
-mod area;
 mod bottom_up;
 mod choose;
 mod estimate;
@@ -14,19 +12,16 @@ mod options;
 mod prices;
 mod probe;
 mod profile;
-mod subtree_sums;
 mod tet_walk;
-mod top_down;
 
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
 mod tests;
 
-pub use area::area_steps;
 pub use choose::{choose, choose_of_all};
 pub use estimate::{Estimator, Start};
 pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, SelectionOutcome, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
-pub use tet_walk::{TetWalker, Walked, mean_steps};
+pub use tet_walk::{TetWalker, Walked};

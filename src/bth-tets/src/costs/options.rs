@@ -13,9 +13,6 @@ pub enum Select {
     /// [`OptimizeFor`].
     #[default]
     Best,
-    /// The paper's rule (§3.2): from the root down, the first nodes whose tetrahedra are the
-    /// cheaper for rays from outside.
-    Paper,
     /// These nodes of the binary BVH, none below another. For measurements.
     Nodes(Vec<u32>),
 }
@@ -100,7 +97,6 @@ fn by_hash<S: Serializer>(profile: &Profile, to: S) -> Result<S::Ok, S::Error> {
 
 impl CostOptions {
     /// Returns true if the gain of the selection cannot become less where more nodes are suitable.
-    /// The paper's rule promises nothing of the kind.
     pub fn more_suitable_gain_more(&self) -> bool {
         matches!(self.select, Select::Best)
     }
@@ -166,9 +162,8 @@ pub struct Verdict {
     pub count: u32,
     /// True if these triangles are free of bad contacts.
     pub suitable: bool,
-    /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that may use it:
-    /// by the paper's rule a ray that hits the node's box, else a ray that starts on one of its
-    /// triangles.
+    /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that starts on
+    /// one of its triangles.
     pub cost_tet: f64,
     /// Estimated cost of the same ray with the node's BVH.
     pub cost_bvh: f64,

@@ -1,7 +1,7 @@
 //! Costs of rays through a tetrahedralization, by its size.
 
 use super::profile::BvhCosts;
-use super::{CostOptions, Start, Walk};
+use super::{CostOptions, Walk};
 use bth_format::layout::{Link32, TetVertex};
 
 /// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on
@@ -56,10 +56,5 @@ impl<'a> Prices<'a> {
     /// one.
     pub(super) fn alone(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.options.profile.tets.alone, triangles, steps, hits)
-    }
-
-    /// Steps of the node's tetrahedralization, estimated.
-    pub(super) fn steps(&self, start: Start, triangles: u32, average_depth: f64) -> f64 {
-        self.options.estimator.steps(start, triangles, average_depth)
     }
 }

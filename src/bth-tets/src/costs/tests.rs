@@ -10,105 +10,14 @@ use bth_bvh::sampling::{KnownRays, SampleRay, from_surface, outside, walk};
 use bth_import::Mesh;
 use bth_import::monitor::Silent;
 
-fn paper() -> CostOptions {
-    CostOptions { select: Select::Paper, minimum_gain: 0.0, ..CostOptions::default() }
-}
-
-fn chosen(bvh: &BinaryBvh, marks: &Marks, options: &CostOptions) -> (Choice, CostReport) {
-    choose(&Mesh::default(), bvh, marks, options, &Silent).unwrap()
-}
-
-/// The cost after the surface area heuristic, and the sum of depths, by plain recursion.
-fn cost_and_depths(bvh: &BinaryBvh, i: usize, depth: u32, visit: f64) -> (f64, u32) {
-    let node = &bvh.nodes[i];
-    if node.is_leaf() {
-        return (visit, depth);
-    }
-    let share = |child: usize| bvh.nodes[child].half_area() / node.half_area();
-    let (l, r) = (i + 1, node.right as usize);
-    let (a, b) = (cost_and_depths(bvh, l, depth + 1, visit), cost_and_depths(bvh, r, depth + 1, visit));
-    (visit + share(l) * a.0 + share(r) * b.0, a.1 + b.1)
-}
-
-fn by_recursion(bvh: &BinaryBvh, marks: &Marks, i: usize, options: &CostOptions, chosen: &mut Vec<u32>) {
-    let node = &bvh.nodes[i];
-    if node.count < options.minimum_triangles {
-        return;
-    }
-    let (sah, depths) = cost_and_depths(bvh, i, 0, options.profile.bvh.outside);
-    let depth = f64::from(depths) / f64::from(node.count);
-    let steps = options.estimator.steps(Start::Outside, node.count, depth);
-    // The tetrahedra fit the caches, so the first cost of a step applies.
-    let walk = options.profile.tets.outside;
-    if marks.suitable[i]
-        && node.count <= options.maximum_triangles
-        && walk.cost(steps, 0.52, 0.0, options.profile.bytes) < sah
-    {
-        chosen.push(i as u32);
-    } else if !node.is_leaf() {
-        by_recursion(bvh, marks, i + 1, options, chosen);
-        by_recursion(bvh, marks, node.right as usize, options, chosen);
-    }
-}
-
-#[test]
-fn the_papers_rule_chooses_what_its_recursion_chooses() {
-    let mut outcomes = [0; 2];
-    for seed in 0..200 {
-        let bvh = tree(seed, 50 + 3 * seed as u32);
-        let marks = marks_beyond(&bvh, (seed % 40) as u32);
-        for estimator in [Estimator::FaceCount, Estimator::AverageDepth] {
-            let mut options =
-                CostOptions { estimator, minimum_triangles: 8, maximum_triangles: 200, ..paper() };
-            options.profile.bvh.outside = 3.4;
-            let c_tet = 0.5 + (seed % 7) as f64 * 0.2;
-            options.profile.tets.outside = Walk { entry: 6.0, hit: 0.0, step: [c_tet, 2.0 * c_tet] };
-            let (choice, report) = chosen(&bvh, &marks, &options);
-            let mut expected = Vec::new();
-            by_recursion(&bvh, &marks, 0, &options, &mut expected);
-            assert_eq!(choice.chosen, expected, "seed {seed}");
-            assert_eq!(report.chosen, expected.len() as u64);
-            outcomes[0] += report.chosen;
-            outcomes[1] += report.refused_for_cost;
-        }
-    }
-    assert!(outcomes.iter().all(|&n| n > 200), "{outcomes:?}");
-}
-
-#[test]
-fn costs_of_the_papers_rule_are_those_of_the_definition() {
-    let bvh = tree(3, 300);
-    let mut options = CostOptions { minimum_triangles: 1, c_tet: Some(1e9), ..paper() };
-    options.profile.bvh.outside = 2.0;
-    let (choice, _) = chosen(&bvh, &marks_beyond(&bvh, 0), &options);
-    assert_eq!(choice.verdicts.len(), bvh.nodes.len());
-    for v in &choice.verdicts {
-        let (sah, _) = cost_and_depths(&bvh, v.node as usize, 0, 2.0);
-        assert!((v.cost_bvh - sah).abs() < 1e-9 * sah);
-        assert_eq!(v.decision, SelectionOutcome::RefusedCost);
-    }
-}
-
-#[test]
-fn nothing_is_chosen_for_a_gain_below_the_least_one() {
-    let bvh = tree(5, 2000);
-    let marks = marks_beyond(&bvh, 3);
-    let options = CostOptions { minimum_triangles: 2, c_tet: Some(1e-3), minimum_gain: 1.1, ..paper() };
-    let (choice, report) = chosen(&bvh, &marks, &options);
-    assert!(choice.chosen.is_empty() && report.triangles == 0);
-    assert!(choice.verdicts.iter().any(|v| v.decision == SelectionOutcome::RefusedGain));
-    assert_eq!(report.cost_with_tets, report.cost_bvh);
-}
-
 #[test]
 fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
-    for options in [paper(), CostOptions::default()] {
-        let (choice, _) = chosen(&BinaryBvh::default(), &Marks::default(), &options);
-        assert!(choice.chosen.is_empty() && choice.verdicts.is_empty());
-        let bvh = tree(1, 9);
-        let error = choose(&Mesh::default(), &bvh, &Marks::default(), &options, &Silent).unwrap_err();
-        assert!(error.to_string().contains("BTH-X030"));
-    }
+    let choose = |bvh: &BinaryBvh| {
+        choose(&Mesh::default(), bvh, &Marks::default(), &CostOptions::default(), &Silent)
+    };
+    let (choice, _) = choose(&BinaryBvh::default()).unwrap();
+    assert!(choice.chosen.is_empty() && choice.verdicts.is_empty());
+    assert!(choose(&tree(1, 9)).unwrap_err().to_string().contains("BTH-X030"));
 }
 
 /// A closed model, its BVH, and marks in which every node is suitable.
@@ -156,6 +65,10 @@ fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
     };
     let (cheap, report) = choice(1e-3, CostOptions::default());
     assert_eq!(cheap.chosen, [0]);
+    let (none, refused) = choice(1e-3, CostOptions { minimum_gain: 1.1, ..CostOptions::default() });
+    assert!(none.chosen.is_empty() && refused.triangles == 0);
+    assert_eq!(none.verdicts[0].decision, SelectionOutcome::RefusedGain);
+    assert_eq!(refused.cost_with_tets, refused.cost_bvh);
     assert!(report.cost_with_tets < 0.5 * report.cost_bvh, "{report:?}");
     assert!(choice(1e3, CostOptions::default()).0.chosen.is_empty());
 
@@ -208,7 +121,8 @@ fn what_all_nodes_cannot_gain_no_marks_can() {
         *if of_all.chosen.is_empty() { &mut none } else { &mut some } += 1;
     }
     assert!(none > 5 && some > 5, "{none}, {some}");
-    assert!(!paper().more_suitable_gain_more());
+    let nodes = CostOptions { select: Select::Nodes(Vec::new()), ..CostOptions::default() };
+    assert!(!nodes.more_suitable_gain_more());
 }
 
 /// Two tetrahedra over the triangle (0, 1, 2), which is a constrained face; the hull is not a box,
@@ -245,19 +159,4 @@ fn walks_end_at_triangles_the_hull_or_the_rays_end() {
     assert_eq!(walker.walk(&ray(0.0, -1.0, f64::INFINITY, Some(9))), walked(false, true));
     assert_eq!(walker.walk(&ray(0.0, 1.0, 0.01, Some(9))), walked(false, false));
     assert_eq!(walker.walk(&ray(5.0, 1.0, f64::INFINITY, None)), None);
-}
-
-#[test]
-fn depths_of_some_nodes_are_those_of_all() {
-    for seed in 0..50 {
-        let bvh = tree(seed, 1 + 17 * seed as u32);
-        let all = subtree_sums::subtree_sums(&bvh);
-        for least in [1, 2, 7, 40, 5000] {
-            let top = choose::nodes_from(&bvh, least);
-            let large: Vec<u32> =
-                top.iter().copied().filter(|&i| bvh.nodes[i as usize].count >= least).collect();
-            let expected: Vec<u64> = large.iter().map(|&i| all[i as usize].depth).collect();
-            assert_eq!(subtree_sums::depths(&bvh, &top, &large), expected, "seed {seed}, {least}");
-        }
-    }
 }

@@ -1,7 +1,6 @@
 //! Rays through a tetrahedralization in double precision, to count their steps.
 //!
-//! Sampling is the first of the paper's three ways to find N_avg (§3.3), the only one that needs
-//! the tetrahedra. A ray through an edge may take one step more or less than in the runtime.
+//! A ray through an edge may take one step more or less than in the runtime.
 
 use crate::{Behind, TetMesh};
 use bth_bvh::sampling::SampleRay;
@@ -114,11 +113,4 @@ impl<'a> TetWalker<'a> {
         }
         Walked { steps: self.mesh.tets.len() as u32, hit: false, left: true }
     }
-}
-
-/// Mean steps of the rays that hit the box; `None` if no ray does.
-pub fn mean_steps(mesh: &TetMesh, rays: &[SampleRay]) -> Option<f64> {
-    let walker = TetWalker::new(mesh);
-    let steps: Vec<u32> = rays.iter().filter_map(|ray| walker.walk(ray)).map(|w| w.steps).collect();
-    (!steps.is_empty()).then(|| steps.iter().map(|s| f64::from(*s)).sum::<f64>() / steps.len() as f64)
 }

@@ -24,8 +24,6 @@ pub(crate) enum Command {
     Compare(compare::Compare),
     /// Measures what a definition names, and appends the rows to the record of this machine.
     Record(records::RecordRows),
-    /// Writes the summary of all records.
-    Summary(records::Summary),
     /// Wrong answers against time, for engines from package registries.
     Truth(truth::Truth),
     /// Hard rays and points on hard surfaces, every answer checked exactly.

@@ -14,7 +14,6 @@ mod load;
 mod machine;
 mod markdown;
 pub mod model;
-mod moller_trumbore;
 mod names;
 mod output;
 pub mod rays;
@@ -43,7 +42,6 @@ pub fn run() -> ExitCode {
             other => other.map(drop),
         },
         Command::Record(arguments) => records::record(&arguments),
-        Command::Summary(arguments) => records::run_summary(&arguments),
         Command::Probe(arguments) => load::probe::run(&arguments),
         command => measure(&command).and_then(|(report, options)| report.finish(options)),
     };

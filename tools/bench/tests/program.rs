@@ -150,7 +150,6 @@ fn mistakes_are_named_with_an_exit_code() {
         (1, "load objects:missing", "objects:missing"),
         (1, "scenes missing", "missing"),
         (1, "record missing", "missing"),
-        (1, "summary --folder missing", "missing"),
         (1, "compare missing.so missing.so torus-knot", "missing.so"),
     ];
     let mut cases: Vec<(i32, Vec<String>, String)> =

@@ -1,5 +1,4 @@
-//! A definition: a file of `benchmarks/definitions/`. It says how a benchmark is measured and which
-//! figures matter.
+//! A definition: a file of `benchmarks/definitions/`. It says how a benchmark is measured.
 
 use super::row::Row;
 use crate::args::Arguments;
@@ -7,6 +6,7 @@ use crate::output::note;
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::path::Path;
 
 /// A definition.
@@ -25,51 +25,9 @@ pub(crate) struct Definition {
     /// list`.
     #[serde(default)]
     pub(crate) models: Vec<String>,
-    /// The figures that the summary shows, some with a bar.
-    #[serde(default)]
-    pub(crate) figures: Vec<Figures>,
-}
-
-/// Selects figures; a key that is not given matches any.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Figures {
-    /// Names of tracers.
-    pub(crate) engines: Option<Vec<String>>,
-    /// Names of ray sets or other figures.
-    pub(crate) sets: Option<Vec<String>>,
-    /// Name of the model, or `mean`.
-    pub(crate) model: Option<String>,
-    /// Instruction set of our kernels.
-    pub(crate) isa: Option<String>,
-    /// Unit.
-    pub(crate) unit: Option<String>,
-    /// The bar: the value must be at least this.
-    pub(crate) at_least: Option<f64>,
-    /// The bar: the value must be at most this.
-    pub(crate) at_most: Option<f64>,
-}
-
-impl Figures {
-    /// Returns true if a row is one of these figures.
-    pub(crate) fn select(&self, row: &Row) -> bool {
-        let is = |wanted: &Option<String>, name: &String| wanted.as_ref().is_none_or(|w| w == name);
-        let is_any = |wanted: &Option<Vec<String>>, name| wanted.as_ref().is_none_or(|w| w.contains(name));
-        is_any(&self.engines, &row.engine)
-            && is_any(&self.sets, &row.set)
-            && is(&self.model, &row.model)
-            && is(&self.isa, &row.isa)
-            && is(&self.unit, &row.unit)
-    }
-
-    /// The bar, and true if a value reaches it; `None` if there is no bar.
-    pub(crate) fn judge(&self, value: f64) -> Option<(String, bool)> {
-        match (self.at_least, self.at_most) {
-            (Some(bar), _) => Some((format!("≥ {bar}"), value >= bar)),
-            (_, Some(bar)) => Some((format!("≤ {bar}"), value <= bar)),
-            _ => None,
-        }
-    }
+    /// The figures that the summary shows, which `tools/bench/summary` reads.
+    #[serde(default, rename = "figures")]
+    _figures: IgnoredAny,
 }
 
 impl Definition {
@@ -77,17 +35,6 @@ impl Definition {
     pub(crate) fn read(path: &Path) -> Result<Definition> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         toml::from_str(&text).with_context(|| path.display().to_string())
-    }
-
-    /// All definitions of a folder, by name.
-    pub(crate) fn read_all(folder: &Path) -> Result<Vec<Definition>> {
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
-            files.push(entry?.path());
-        }
-        files.retain(|file| file.extension().is_some_and(|e| e == "toml"));
-        files.sort();
-        files.iter().map(|file| Self::read(file)).collect()
     }
 
     /// Measures the rows of the definition now; none if its models are folders of recorded rays

@@ -1,20 +1,18 @@
-//! The records of `benchmarks/`: definitions name what is measured, rows hold the figures, and the
-//! summary has the newest ones.
+//! The records of `benchmarks/`: definitions name what is measured, and rows hold the figures.
+//! `tools/bench/summary` shows the newest ones.
 //!
 //! A row is one figure; a file holds the rows of one kind of processor and one day, and is only
 //! ever appended to.
 
 mod definition;
 mod row;
-mod summary;
 
 use definition::Definition;
 pub(crate) use row::{HEAD, Row, cpu_folder};
-pub(crate) use summary::summarize;
 
 use crate::machine;
-use crate::output::{self, note};
-use anyhow::{Context, Result, ensure};
+use crate::output::note;
+use anyhow::{Context, Result};
 use clap::Args;
 use std::fmt::Write as _;
 use std::io::{Read, Write};
@@ -34,17 +32,6 @@ pub(crate) struct RecordRows {
     /// Small pictures and one round; prints the rows and appends nothing.
     #[arg(long)]
     pub(crate) quick: bool,
-}
-
-/// `summary`.
-#[derive(Debug, Args)]
-pub(crate) struct Summary {
-    /// Folder that holds `definitions/` and `record/`; SUMMARY.md is written there.
-    #[arg(long, value_name = "DIR", default_value = "benchmarks")]
-    pub(crate) folder: PathBuf,
-    /// Only checks that SUMMARY.md is up to date.
-    #[arg(long)]
-    pub(crate) check: bool,
 }
 
 /// Measures what a definition names, and appends the rows to the file of this processor and day.
@@ -94,18 +81,6 @@ fn append(file: &Path, rows: &str) -> std::io::Result<()> {
         Some(_) => "\n".to_owned(),
     };
     open.write_all((before + rows).as_bytes())
-}
-
-/// Writes SUMMARY.md from all records.
-pub(crate) fn run_summary(arguments: &Summary) -> Result<()> {
-    let text = summarize(&arguments.folder)?;
-    let file = arguments.folder.join("SUMMARY.md");
-    if arguments.check {
-        let found = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
-        ensure!(found == text, "{}: not up to date: run `bth-bench summary`", file.display());
-        return Ok(());
-    }
-    output::write(&file, &text)
 }
 
 #[cfg(test)]

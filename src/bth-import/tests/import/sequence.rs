@@ -256,13 +256,15 @@ fn a_vertex_cache_moves_the_primitives_of_a_gltf_mesh_one_after_the_other() {
     let model = model.rows(&[[2u16], [0], [1]]).rows(&[[0u8; 4]; 3]);
     let moved: Vec<[f32; 3]> = (0..12).map(|i| [i as f32, (i * i) as f32, 0.0]).collect();
     let folder = tempfile::tempdir().unwrap();
-    let files = [
-        ("a.glb", &model.glb()[..]),
-        ("a.obj", frame(0.0).as_bytes()),
-        ("a.pc2", &pc2(6, &moved, 0.0, 1.0)),
-        ("b.pc2", &pc2(9, &[[0.0; 3]; 9], 0.0, 1.0)),
-    ];
-    let paths = write(folder.path(), &files);
+    let paths = write(
+        folder.path(),
+        &[
+            ("a.glb", &model.glb()[..]),
+            ("a.obj", frame(0.0).as_bytes()),
+            ("a.pc2", &pc2(6, &moved, 0.0, 1.0)),
+            ("b.pc2", &pc2(9, &[[0.0; 3]; 9], 0.0, 1.0)),
+        ],
+    );
     let wanted = Wanted { groups: true, ..Wanted::default() };
     let read = |model: usize, mesh, cache: usize| {
         import_vertex_cache((&paths[model], mesh), &paths[cache], &TIMING, wanted, &Silent)

@@ -103,7 +103,8 @@ impl Sampled {
         before(nodes.end) - before(nodes.start)
     }
 
-    /// The gains of these nodes, which are ascending. `weights` are the weights of rays from outside and from surfaces.
+    /// The gains of these nodes, which are ascending. `weights` are the weights of rays from
+    /// outside and from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,

@@ -2,7 +2,8 @@
 //!
 //! `profile` holds the measured costs of tracing on a machine. `tet_walk` counts steps of
 //! [sample rays](bth_bvh::sampling); `estimate` predicts the steps without tracing. `choose`
-//! selects the nodes of max saving (`gains`, `bottom_up`). `probe` decides again with sampled rays when the tetrahedra are built.
+//! selects the nodes of max saving (`gains`, `bottom_up`). `probe` decides again with sampled rays
+//! when the tetrahedra are built.
 
 mod bottom_up;
 mod choose;

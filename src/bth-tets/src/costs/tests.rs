@@ -12,9 +12,8 @@ use bth_import::monitor::Silent;
 
 #[test]
 fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
-    let choose = |bvh: &BinaryBvh| {
-        choose(&Mesh::default(), bvh, &Marks::default(), &CostOptions::default(), &Silent)
-    };
+    let choose =
+        |bvh: &BinaryBvh| choose(&Mesh::default(), bvh, &Marks::default(), &CostOptions::default(), &Silent);
     let (choice, _) = choose(&BinaryBvh::default()).unwrap();
     assert!(choice.chosen.is_empty() && choice.verdicts.is_empty());
     assert!(choose(&tree(1, 9)).unwrap_err().to_string().contains("BTH-X030"));

@@ -77,8 +77,7 @@ impl Builder {
         object: Option<usize>,
         transform: Transform,
     ) -> usize {
-        self.manifest.nodes.push(Node { name, parent, transform, object, group: None, visible: true });
-        self.manifest.nodes.len() - 1
+        self.manifest.nodes.push(Node { name: &name, parent, transform, object, group: None, visible: true })
     }
 
     fn track(&mut self, node: usize, property: Property, keys: impl IntoIterator<Item = (f64, Vec<f64>)>) {

@@ -25,19 +25,26 @@ pub struct WrittenOut {
 impl Groups {
     /// The groups of a scene, whose nodes have been checked; `None` if it has no groups.
     pub fn of(view: &SceneView<'_>) -> Option<Groups> {
-        let world = view.nodes.iter().filter(|node| node.flags & NODE_GROUP != 0).count() as u32;
+        let parent = |node: &Node| (node.parent != NONE).then_some(node.parent);
+        Groups::of_rows(view.nodes.iter().map(|node| (parent(node), node.flags & NODE_GROUP != 0)))
+    }
+
+    /// The groups of nodes, parents first, that are given by their parents and by whether they are
+    /// the first of a group; `None` if there are none.
+    pub fn of_rows(nodes: impl Iterator<Item = (Option<u32>, bool)> + Clone) -> Option<Groups> {
+        let world = nodes.clone().filter(|(_, is_group)| *is_group).count() as u32;
         if world == 0 {
             return None;
         }
-        let (mut of_node, mut next): (Vec<u32>, u32) = (Vec::with_capacity(view.nodes.len()), 0);
-        for node in view.nodes {
-            of_node.push(match node.parent {
-                NONE if node.flags & NODE_GROUP != 0 => {
+        let (mut of_node, mut next): (Vec<u32>, u32) = (Vec::with_capacity(nodes.size_hint().0), 0);
+        for (parent, is_group) in nodes {
+            of_node.push(match parent {
+                None if is_group => {
                     next += 1;
                     next - 1
                 }
-                NONE => world,
-                parent => of_node[parent as usize],
+                None => world,
+                Some(parent) => of_node[parent as usize],
             });
         }
         Some(Groups { of_node, world })

@@ -1,11 +1,11 @@
 //! Groups of nodes: which nodes are in which, and in what order groups come.
 
-use crate::model::Node;
+use crate::nodes::Nodes;
 
 /// Max number of nodes with instances on the way to an object, the one of the object included.
 const MAX_LEVELS: u32 = 16;
 
-/// The groups of a scene: trees of nodes that nodes show as a whole ([`Node::group`]).
+/// The groups of a scene: trees of nodes that nodes show as a whole ([`crate::Node::group`]).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeGroups {
     /// For each node the first of its tree.
@@ -20,7 +20,7 @@ impl NodeGroups {
     ///
     /// # Errors
     /// A node that shows a group which shows it again, or which has too many levels.
-    pub fn of(nodes: &[Node]) -> Result<Option<NodeGroups>, usize> {
+    pub fn of(nodes: &Nodes) -> Result<Option<NodeGroups>, usize> {
         let instances: Vec<_> =
             nodes.iter().enumerate().filter_map(|(row, node)| Some((row, node.group?))).collect();
         if instances.is_empty() {
@@ -31,7 +31,7 @@ impl NodeGroups {
         for start in 0..nodes.len() {
             let mut at = start;
             let first = loop {
-                match (root[at], nodes[at].parent) {
+                match (root[at], nodes.parent(at)) {
                     (Some(first), _) => break first,
                     (None, Some(parent)) => {
                         path.push(at);

@@ -13,6 +13,7 @@ pub mod limits;
 mod model;
 mod names;
 mod node_tables;
+mod nodes;
 mod read;
 mod read_deformers;
 mod read_material;
@@ -28,6 +29,7 @@ pub use error::{Error, Result};
 pub use groups::NodeGroups;
 pub use joint_set::JointSet;
 pub use model::*;
+pub use nodes::{Node, Nodes};
 pub use read::{parse, read};
 
 /// The keys that are allowed in each table, by the name of the table in the specification.

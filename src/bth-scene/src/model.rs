@@ -2,6 +2,7 @@
 //! of [`Manifest`].
 
 use crate::joint_set::JointSet;
+use crate::nodes::{IDENTITY, Nodes};
 
 /// Version of the manifest format that this crate reads and writes.
 pub const VERSION: i64 = 1;
@@ -16,7 +17,7 @@ pub struct Manifest {
     /// Geometries, each in its own space.
     pub objects: Vec<Object>,
     /// The hierarchy, in any order; no node is its own ancestor.
-    pub nodes: Vec<Node>,
+    pub nodes: Nodes,
     /// Cameras.
     pub cameras: Vec<Camera>,
     /// Lights.
@@ -193,24 +194,6 @@ impl Source {
     }
 }
 
-/// A node of the hierarchy.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Node {
-    /// Unique among nodes.
-    pub name: String,
-    /// Parent in the hierarchy; `None` for the world.
-    pub parent: Option<usize>,
-    /// From its own space to its parent's, before tracks.
-    pub transform: Transform,
-    /// The object if the node is an instance.
-    pub object: Option<usize>,
-    /// A node without parent if this one, which has no object, is an instance of the group of that
-    /// node and all below it. They then show nowhere else.
-    pub group: Option<usize>,
-    /// True if the node and its descendants are visible, before tracks.
-    pub visible: bool,
-}
-
 /// From a node's space to its parent's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Transform {
@@ -229,7 +212,8 @@ pub enum Transform {
 
 impl Default for Transform {
     fn default() -> Self {
-        Transform::Parts { translation: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0], scale: [1.0; 3] }
+        let (translation, rotation, scale) = IDENTITY;
+        Transform::Parts { translation, rotation, scale }
     }
 }
 

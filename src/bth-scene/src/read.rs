@@ -7,6 +7,7 @@ use crate::limits::MAX_MANIFEST;
 use crate::model::*;
 use crate::names::Names;
 use crate::node_tables::NodeTables;
+use crate::nodes::{Node, Nodes};
 use crate::read_deformers::{DEFORMER_KEYS, SKIN_KEYS, deformers, skin};
 use crate::read_material::{color, material};
 use crate::read_path::path;
@@ -85,8 +86,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
 
     let frames = scene.get("frames").map(|v| frames(&v)).transpose()?.unwrap_or_default();
     let camera = scene.get("camera").map(|v| camera_names.row(&v)).transpose()?;
-    let read_node = |row| nodes.with(row, |table| node(table, &node_names, &object_names));
-    let read_nodes = (0..nodes.len()).map(read_node).collect::<Result<Vec<_>>>()?;
+    let mut read_nodes = Nodes::with_capacity(nodes.len());
+    for row in 0..nodes.len() {
+        nodes.with(row, |table| node(table, &node_names, &object_names, &mut read_nodes))?;
+    }
     check_cycles(&nodes, &read_nodes)?;
     let skins = scene.tables("skins", SKIN_KEYS)?;
     let skin_names = Names::collect("skin", &skins)?;
@@ -95,8 +98,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
     let tracks = tracks(&scene.tables("tracks", TRACK_KEYS)?, &node_names, &read_nodes, &deformers)?;
     if let Some(groups) = node_groups(&nodes, &read_nodes)? {
         let skinned: Vec<_> = deformers.iter().filter(|of| of.skin.is_some()).map(|of| of.object).collect();
-        let is_skinned = |node: &Node| node.object.is_some_and(|object| skinned.contains(&object));
-        let is_wrong = |row: &usize| groups.is_in_group(*row) && is_skinned(&read_nodes[*row]);
+        let is_skinned = |node: Node<'_>| node.object.is_some_and(|object| skinned.contains(&object));
+        let is_wrong = |row: &usize| groups.is_in_group(*row) && is_skinned(read_nodes.get(*row));
         if let Some(row) = (0..nodes.len()).find(is_wrong) {
             return nodes.with(row, |table| Err(in_group(&table.need("object")?, "an object with a skin")));
         }
@@ -229,26 +232,28 @@ fn without_joints(table: &Table<'_>) -> Result<JointSet> {
     value.array()?.iter().map(joint).collect()
 }
 
-fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>) -> Result<Node> {
+/// Reads a node.
+fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>, into: &mut Nodes) -> Result<()> {
     table.exclude("object", "group")?;
-    Ok(Node {
-        name: name(table)?,
+    into.push(Node {
+        name: table.need("name")?.string()?,
         parent: table.get("parent").map(|v| nodes.row(&v)).transpose()?,
         transform: transform(table)?,
         object: table.get("object").map(|v| objects.row(&v)).transpose()?,
         group: table.get("group").map(|v| nodes.row(&v)).transpose()?,
         visible: table.get("visible").map_or(Ok(true), |v| v.boolean())?,
-    })
+    });
+    Ok(())
 }
 
 /// The groups of nodes. Fails when a node with a parent is named as one, or groups show each other
 /// in a circle or too deeply.
-fn node_groups(tables: &NodeTables<'_>, nodes: &[Node]) -> Result<Option<NodeGroups>> {
+fn node_groups(tables: &NodeTables<'_>, nodes: &Nodes) -> Result<Option<NodeGroups>> {
     let error = |row: usize, code: &'static str, message: String, hint: &'static str| {
         tables.with(row, |table| Err(table.need("group")?.error(code, message, hint)))
     };
     for (row, node) in nodes.iter().enumerate() {
-        if let Some(group) = node.group.map(|group| &nodes[group]).filter(|group| group.parent.is_some()) {
+        if let Some(group) = node.group.map(|group| nodes.get(group)).filter(|group| group.parent.is_some()) {
             let message = format!("the node \"{}\" has a parent: a group is a node without one", group.name);
             return error(row, code::CONFLICT, message, "name the first node of a tree");
         }
@@ -265,18 +270,18 @@ fn in_group(value: &Value<'_>, what: &str) -> Error {
 }
 
 /// Fails when a node is its own ancestor. Every node is visited once.
-fn check_cycles(tables: &NodeTables<'_>, nodes: &[Node]) -> Result<()> {
+fn check_cycles(tables: &NodeTables<'_>, nodes: &Nodes) -> Result<()> {
     const UNSEEN: usize = usize::MAX;
     let mut seen_from = vec![UNSEEN; nodes.len()];
     for start in 0..nodes.len() {
         let mut next = Some(start);
         while let Some(at) = next.filter(|at| seen_from[*at] == UNSEEN) {
             seen_from[at] = start;
-            next = nodes[at].parent;
+            next = nodes.parent(at);
         }
         // A node that was visited from this same start closes a cycle.
         if let Some(at) = next.filter(|at| seen_from[*at] == start) {
-            let message = format!("the node \"{}\" is its own ancestor", nodes[at].name);
+            let message = format!("the node \"{}\" is its own ancestor", nodes.name(at));
             let hint = "give one node of the circle another parent";
             return tables.with(at, |table| Err(table.need("parent")?.error(code::CYCLE, message, hint)));
         }

@@ -1,8 +1,9 @@
 //! Tracks: keyframes of one property of one node.
 
 use crate::error::{Result, code};
-use crate::model::{Deformer, Interpolation, Node, Property, Track, Transform};
+use crate::model::{Deformer, Interpolation, Property, Track, Transform};
 use crate::names::Names;
+use crate::nodes::Nodes;
 use crate::read_transform::rotation;
 use crate::table::{Table, Value};
 use std::collections::{HashMap, HashSet};
@@ -14,7 +15,7 @@ pub(crate) const TRACK_KEYS: &[&str] = &["node", "property", "interpolation", "t
 pub(crate) fn tracks(
     tables: &[Table<'_>],
     names: &Names<'_>,
-    nodes: &[Node],
+    nodes: &Nodes,
     deformers: &[Deformer],
 ) -> Result<Vec<Track>> {
     let mut seen = HashSet::new();
@@ -23,7 +24,7 @@ pub(crate) fn tracks(
         .iter()
         .map(|table| {
             let track = track(table, names, &weights)?;
-            let node = &nodes[track.node];
+            let node = nodes.get(track.node);
             let moves = !matches!(track.property, Property::Visible | Property::Weights);
             if matches!(node.transform, Transform::Matrix(_)) && moves {
                 let message = format!("the node \"{}\" has a matrix, which tracks cannot move", node.name);

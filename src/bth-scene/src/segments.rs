@@ -84,12 +84,13 @@ fn statement(text: &[u8]) -> usize {
 
 /// Bytes of the string at the start of a text.
 fn string(text: &[u8]) -> usize {
-    let quote = text[0];
+    let (quote, end) = (text[0], text.len());
     let marks = if text.starts_with(&[quote; 3]) { 3 } else { 1 };
     let mut at = marks;
     while let Some(byte) = text.get(at) {
         match byte {
-            b'\\' if quote == b'"' => at += 2,
+            // The text may end behind the backslash.
+            b'\\' if quote == b'"' => at = end.min(at + 2),
             b'\n' if marks == 1 => return at,
             _ if text[at..].starts_with(&[quote; 3][..marks]) => {
                 at += marks;
@@ -135,6 +136,8 @@ mod tests {
             "a = \"\"\"\n[[nodes]]\n\"\"\"\"\n",
             "[nodes]\n",
             "# [[nodes]]\n[x]",
+            "a = \"\\",
+            "a = \"\\\u{fffd}",
         ] {
             assert_eq!(cut(text), (vec![], text.to_owned()));
         }

@@ -1,6 +1,7 @@
 //! Writes a manifest.
 
 use crate::model::*;
+use crate::nodes::Node;
 use std::fmt::Write;
 
 /// Keyframes on a line of a track.
@@ -65,7 +66,7 @@ impl Manifest {
 
     fn write_skin(&self, out: &mut String, skin: &Skin) -> std::fmt::Result {
         writeln!(out, "\n[[skins]]\nname = {}", text(&skin.name))?;
-        list(out, "joints", skin.joints.iter().map(|joint| text(&self.nodes[*joint].name)))?;
+        list(out, "joints", skin.joints.iter().map(|joint| text(self.nodes.name(*joint))))?;
         match &skin.inverse_binds {
             Some(matrices) => list(out, "inverse_binds", matrices.iter().map(|rows| format!("{rows:?}"))),
             None => Ok(()),
@@ -73,7 +74,7 @@ impl Manifest {
     }
 
     fn write_deformer(&self, out: &mut String, deformer: &Deformer) -> std::fmt::Result {
-        writeln!(out, "\n[[deformers]]\nnode = {}", text(&self.nodes[deformer.node].name))?;
+        writeln!(out, "\n[[deformers]]\nnode = {}", text(self.nodes.name(deformer.node)))?;
         writeln!(out, "object = {}", text(&self.objects[deformer.object].name))?;
         if let Some(skin) = deformer.skin {
             writeln!(out, "skin = {}", text(&self.skins[skin].name))?;
@@ -84,16 +85,16 @@ impl Manifest {
         Ok(())
     }
 
-    fn write_node(&self, out: &mut String, node: &Node) -> std::fmt::Result {
-        writeln!(out, "\n[[nodes]]\nname = {}", text(&node.name))?;
+    fn write_node(&self, out: &mut String, node: Node<'_>) -> std::fmt::Result {
+        writeln!(out, "\n[[nodes]]\nname = {}", text(node.name))?;
         if let Some(parent) = node.parent {
-            writeln!(out, "parent = {}", text(&self.nodes[parent].name))?;
+            writeln!(out, "parent = {}", text(self.nodes.name(parent)))?;
         }
         if let Some(object) = node.object {
             writeln!(out, "object = {}", text(&self.objects[object].name))?;
         }
         if let Some(group) = node.group {
-            writeln!(out, "group = {}", text(&self.nodes[group].name))?;
+            writeln!(out, "group = {}", text(self.nodes.name(group)))?;
         }
         if !node.visible {
             writeln!(out, "visible = false")?;
@@ -120,7 +121,7 @@ impl Manifest {
 
     fn write_camera(&self, out: &mut String, camera: &Camera) -> std::fmt::Result {
         writeln!(out, "\n[[cameras]]\nname = {}", text(&camera.name))?;
-        writeln!(out, "node = {}", text(&self.nodes[camera.node].name))?;
+        writeln!(out, "node = {}", text(self.nodes.name(camera.node)))?;
         match camera.lens {
             Lens::Perspective(fov) => writeln!(out, "fov = {:?}", fov)?,
             Lens::Orthographic(height) => writeln!(out, "height = {height:?}")?,
@@ -133,7 +134,7 @@ impl Manifest {
 
     fn write_light(&self, out: &mut String, light: &Light) -> std::fmt::Result {
         writeln!(out, "\n[[lights]]\nname = {}", text(&light.name))?;
-        writeln!(out, "node = {}", text(&self.nodes[light.node].name))?;
+        writeln!(out, "node = {}", text(self.nodes.name(light.node)))?;
         match light.kind {
             LightKind::Directional => writeln!(out, "kind = \"directional\"")?,
             LightKind::Point => writeln!(out, "kind = \"point\"")?,
@@ -146,7 +147,7 @@ impl Manifest {
     }
 
     fn write_track(&self, out: &mut String, track: &Track) -> std::fmt::Result {
-        writeln!(out, "\n[[tracks]]\nnode = {}", text(&self.nodes[track.node].name))?;
+        writeln!(out, "\n[[tracks]]\nnode = {}", text(self.nodes.name(track.node)))?;
         let (property, interpolation) = (track.property.name(), track.interpolation.name());
         writeln!(out, "property = \"{property}\"\ninterpolation = \"{interpolation}\"")?;
         list(out, "times", track.times.iter().map(|t| format!("{t:?}")))?;

@@ -60,20 +60,24 @@ prop_compose! {
         let extra_share = lens.2.unwrap_or(0.0) / 10.0;
         let material = Material { color: [extra_share, 1.0, 0.1], metallic: extra_share, ..Material::default() };
         objects[0].material = lens.2.map(|_| material);
-        let row = |i: usize, (name, transform, flags, object): &(String, Transform, [bool; 3], usize)| Node {
-            name: format!("{name}{i}"),
+        let mut rows = Nodes::default();
+        for (i, (name, transform, flags, object)) in nodes.iter().enumerate() {
+            rows.push(Node {
+            name: &format!("{name}{i}"),
             parent: (flags[0] && i > 0).then(|| object % i),
             transform: *transform,
             object: flags[1].then_some(object % 3),
             group: None,
             visible: flags[2],
-        };
-        let mut nodes: Vec<Node> = nodes.iter().enumerate().map(|(i, node)| row(i, node)).collect();
-        let plain = |name: &str, group| Node {
-            name: name.into(), parent: None, transform: Transform::default(), object: None, group, visible: true,
+        });
+        }
+        let mut nodes = rows;
+        let plain = |name: &'static str, group| Node {
+            name, parent: None, transform: Transform::default(), object: None, group, visible: true,
         };
         let group = nodes.len();
-        nodes.extend([plain("group", None), plain("shows it", Some(group))]);
+        nodes.push(plain("group", None));
+        nodes.push(plain("shows it", Some(group)));
         let property = Property::ALL[property];
         let visible = property == Property::Visible;
         let interpolation = if visible { Interpolation::Step } else { Interpolation::ALL[interpolation] };
@@ -93,7 +97,7 @@ prop_compose! {
         let (fov, perspective, extra) = lens;
         let extra_number = extra.unwrap_or(0.0);
         let moves = !matches!(property, Property::Visible | Property::Weights);
-        let movable = matches!(nodes[0].transform, Transform::Parts { .. }) || !moves;
+        let movable = matches!(nodes.get(0).transform, Transform::Parts { .. }) || !moves;
         let binds = [[[frames.2, 0.0, -1.5, extra_number], [0.0; 4], [fov, 1.0, 2.0, 3.0]]; 2];
         let track = Track { node: 0, property, interpolation, times, values };
         Manifest {

@@ -201,10 +201,7 @@ fn what_no_chosen_animation_moves_is_at_rest_in_world_space() {
 fn joints_outside_of_the_scene_get_nodes() {
     let document = one_skin().edit(|d| d["scenes"][0]["nodes"] = json!([0]));
     let (manifest, _) = document.imported(&ImportOptions::default()).unwrap();
-    assert_eq!(
-        manifest.nodes.iter().map(|n| n.name.as_str()).collect::<Vec<_>>(),
-        ["mesh", "root", "a", "b"]
-    );
+    assert_eq!(manifest.nodes.iter().map(|n| n.name).collect::<Vec<_>>(), ["mesh", "root", "a", "b"]);
     assert_near(&document.world(2.0)[1..2], &[[4.0, 10.0, 5.0]]);
 }
 

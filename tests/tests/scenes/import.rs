@@ -91,8 +91,7 @@ fn edited(edit: impl FnOnce(&mut Value)) -> Value {
 fn nodes_keep_their_hierarchy_transforms_names_and_visibility() {
     let all = ImportOptions { animation: Chosen::All, ..ImportOptions::default() };
     let (manifest, report) = import(&document(), &all).unwrap();
-    let nodes: Vec<_> =
-        manifest.nodes.iter().map(|n| (n.name.as_str(), n.parent, n.object, n.visible)).collect();
+    let nodes: Vec<_> = manifest.nodes.iter().map(|n| (n.name, n.parent, n.object, n.visible)).collect();
     let expected = [
         ("arm", None, None, true),
         ("arm 2", Some(0), Some(0), true),
@@ -104,9 +103,11 @@ fn nodes_keep_their_hierarchy_transforms_names_and_visibility() {
         ("node 4", None, None, true),
     ];
     assert_eq!(nodes, expected);
-    let Transform::Matrix(rows) = manifest.nodes[1].transform else { panic!("{:?}", manifest.nodes[1]) };
+    let Transform::Matrix(rows) = manifest.nodes.get(1).transform else {
+        panic!("{:?}", manifest.nodes.get(1))
+    };
     assert_eq!(rows, [[1.0, 0.0, 0.0, 5.0], [0.0, 0.0, -2.0, 6.0], [0.0, 1.0, 0.0, 7.0]]);
-    let Transform::Parts { translation, rotation, .. } = manifest.nodes[5].transform else { panic!() };
+    let Transform::Parts { translation, rotation, .. } = manifest.nodes.get(5).transform else { panic!() };
     assert_eq!((translation, rotation), ([4.0, 5.0, 6.0], [0.0, 1.0, 0.0, 0.0]));
     assert_eq!(manifest.objects[0].name, "tri angle");
     assert_eq!(manifest.objects[1].source, Source::Model { path: "sub/a.gltf".into(), mesh: Some(1) });

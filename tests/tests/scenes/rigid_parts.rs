@@ -283,7 +283,7 @@ fn a_mesh_of_rigid_parts_alone_never_deforms() {
     let document = soft(all_rigid);
     let (manifest, report) = parted(&document);
     assert_eq!((report.deformers, report.rigid_parts, manifest.objects.len()), (0, 3, 3));
-    assert!(manifest.nodes[0].object.is_none());
+    assert!(manifest.nodes.get(0).object.is_none());
     let (mut whole, mut parts) = (scene(&document, false), scene(&document, true));
     for seconds in [0.5, 3.0] {
         assert_eq!(whole.set_seconds(seconds).unwrap().deformed, 1);

@@ -38,13 +38,19 @@ pub(super) fn file(source: &SourceDigest, path: &Path, options: &CompileOptions,
 
 /// A compiled scene. `parts` numbers the objects as the manifest does, `sources` identifies the
 /// content of each used one.
-pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &CompileOptions, tetgen: &str) -> Key {
-    let SceneParts { scene, nodes, instances, tracks, times, values, cameras, lights, names, deformers } =
+/// `nodes` is a hash of the rows of nodes, which are not in `parts`.
+pub(crate) fn scene(
+    parts: &SceneParts,
+    nodes: Digest,
+    sources: &[String],
+    options: &CompileOptions,
+    tetgen: &str,
+) -> Key {
+    let SceneParts { scene, nodes: _, instances, tracks, times, values, cameras, lights, names, deformers } =
         parts;
     let DeformerParts { deformers, skins, joints, weights } = deformers;
     let mut hasher = HashedRows::new("scene");
     hasher.add(std::slice::from_ref(scene));
-    hasher.add(nodes);
     hasher.add(instances);
     hasher.add(tracks);
     hasher.add(times);
@@ -60,6 +66,7 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &CompileOpt
     sources.iter().for_each(|source| objects.add(source.as_bytes()));
     Key::new("scene")
         .with("scene", hasher.finish().hex())
+        .with("nodes", nodes.hex())
         .with("objects", objects.finish().hex())
         .with_all(components(options, tetgen))
 }

@@ -37,7 +37,12 @@ impl Clips {
             return Ok(Self::default());
         }
         let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
-        let parts = encode::encode(manifest, order, visible, &as_they_are)?;
+        let mut nodes = Vec::new();
+        let (parts, _) = encode::encode(manifest, order, visible, &as_they_are, &mut |rows| {
+            nodes.extend_from_slice(rows);
+            Ok(())
+        })?;
+        let parts = SceneParts { nodes, ..parts };
         let nodes = node_digests(&parts);
         let mut clips = Self::default();
         for deformer in &parts.deformers.deformers {
@@ -176,7 +181,7 @@ fn digest(parts: &SceneParts, deformer: &Deformer, nodes: &[Digest]) -> Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bth_scene::Transform;
+    use bth_scene::{Node, Transform};
 
     /// A node "arm" under a node "body", which deforms an object by two targets, with a track of
     /// their weights.
@@ -200,11 +205,23 @@ mod tests {
     fn a_clip_depends_on_all_that_moves_the_object_and_on_nothing_else() {
         let clip_of = clip(|_| {});
         assert!(clip_of.is_some());
-        let moved = Transform::Matrix([[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
-        assert_eq!(clip(|m| m.nodes[2].transform = moved), clip_of);
-        assert_eq!(clip(|m| m.nodes[0].name = "torso".to_owned()), clip_of);
-        assert_ne!(clip(|m| m.nodes[0].transform = moved), clip_of);
-        assert_ne!(clip(|m| m.nodes[1].transform = moved), clip_of);
+        let with_node = |at: usize, change: fn(&mut Node<'_>)| {
+            clip(|m| {
+                let changed = m.nodes.iter().enumerate().map(|(row, mut node)| {
+                    (row == at).then(|| change(&mut node));
+                    node
+                });
+                m.nodes = changed.collect();
+            })
+        };
+        let moved: fn(&mut Node<'_>) = |node| {
+            node.transform =
+                Transform::Matrix([[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+        };
+        assert_eq!(with_node(2, moved), clip_of);
+        assert_eq!(with_node(0, |node| node.name = "torso"), clip_of);
+        assert_ne!(with_node(0, moved), clip_of);
+        assert_ne!(with_node(1, moved), clip_of);
         assert_ne!(clip(|m| m.frames.last = 9), clip_of);
         assert_ne!(clip(|m| m.deformers[0].weights[1] = 0.5), clip_of);
         assert_ne!(clip(|m| m.deformers[0].skin = None), clip_of);

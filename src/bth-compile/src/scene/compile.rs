@@ -6,18 +6,17 @@ use super::objects::{self, Objects};
 use super::plan::ScenePlan;
 use super::report::{ObjectReport, SceneReport};
 use super::{deformers, encode, meshes, sources, visible, whole_files};
-use crate::cached::Cache;
+use crate::cached::{Cache, HashedRows, Sink};
 use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
 use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetch};
 use crate::stage::Clock;
-use crate::write::{self, Content, FileBuilder, SceneParts};
+use crate::write::{self, Content, FileBuilder, SceneParts, SectionHead};
 use bth::Trees;
 use bth_cache::{Key, Record};
-use bth_format::SceneView;
 use bth_format::groups::Groups;
-use bth_format::layout::{CacheLine, NODE_LINES, NONE, Tree, kind};
+use bth_format::layout::{CacheLine, NODE_LINES, NONE, Node, Tree, kind};
 use bth_scene::Manifest;
 use std::path::Path;
 use zerocopy::IntoBytes;
@@ -25,6 +24,8 @@ use zerocopy::IntoBytes;
 /// Lines of trees from which on a file holds them: placing the rows of smaller ones when the file
 /// is opened takes less than a millisecond.
 const MIN_TREE_LINES: usize = 200 * NODE_LINES;
+/// Lines of trees that are kept at a time.
+const CHUNK: usize = 1 << 14;
 
 /// Compiles a scene; paths of the manifest count from `folder`, `name` names the scene in messages.
 ///
@@ -179,12 +180,16 @@ pub fn dry_run(
 fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
     let Some(tetgen) = &context.tetgen else { return Ok(None) };
     let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
-    let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
+    let mut nodes = HashedRows::new("nodes");
+    let (parts, _) = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are, &mut |rows| {
+        nodes.add(rows);
+        Ok(())
+    })?;
     let mut contents = sources::contents(manifest, &plan.sources);
     if context.options.names {
         contents.extend(manifest.objects.iter().map(|object| object.name.clone()));
     }
-    Ok(Some(pipeline::scene(&parts, &contents, context.options, tetgen)))
+    Ok(Some(pipeline::scene(&parts, nodes.finish(), &contents, context.options, tetgen)))
 }
 
 /// Compiles the objects and assembles the file.
@@ -202,33 +207,27 @@ fn build(
     }
     let mut objects = objects::build(manifest, &plan.sources, context, &mut clock)?;
     deformers::check(manifest, &objects.number, name, &|object| objects.deformation(object))?;
-    let parts = encode::encode(manifest, &plan.order, &plan.visible, &objects.number)?;
-
     let provenance = pipeline::provenance_of_scene(&objects.sources, objects.worker.as_ref(), options)?;
     let (content, mut report) = clock.time("file", || {
-        let mut builder = FileBuilder::new();
+        let (rows, mut report) = scene_rows(manifest, plan, &mut objects, context)?;
+        let mut builder = rows.clone();
         objects.write(&mut builder)?;
-        write::scene(&mut builder, &parts)?;
         if options.names {
             let name = |report: &ObjectReport| report.names.first().cloned().unwrap_or_default();
-            write::object_names(&mut builder, objects.reports.iter().map(name))?;
+            write::object_names(&mut builder, report.objects.iter().map(name))?;
         }
         super::images::write(&mut builder, &plan.sources, &objects, context)?;
         builder.provenance(provenance)?;
-        let mut to_disk = |bytes: &[u8]| context.keeper.keep_bytes(bytes);
-        builder.move_large(&mut to_disk)?;
-        let mut builder = builder.into_static();
-        let mut report = report(manifest, plan, &mut objects, &parts);
-        let Trees { trees, lines } = check(&objects, parts, &builder, name)?;
+        builder.move_large(&mut |bytes: &[u8]| context.keeper.keep_bytes(bytes))?;
+        let Trees { trees, lines } = check(&objects, rows, &builder, (report.deformers > 0, name), context)?;
         if lines.len() >= MIN_TREE_LINES {
             builder.section(kind::TREES, NONE, size_of::<Tree>() as u32, trees.as_bytes().to_vec())?;
-            builder.section(
-                kind::TREE_LINES,
-                NONE,
-                size_of::<CacheLine>() as u32,
-                lines.as_bytes().to_vec(),
-            )?;
-            builder.move_large(&mut to_disk)?;
+            let mut section = context.keeper.pieces();
+            lines.chunks(CHUNK).try_for_each(|lines| section.add(lines.as_bytes()))?;
+            let (bytes, hash) = section.finish()?;
+            let stride = size_of::<CacheLine>() as u32;
+            let head = SectionHead { kind: kind::TREE_LINES, object: NONE, stride, hash };
+            builder.hashed_section(head, None, bytes)?;
         }
         builder.check_limits()?;
         let content = Content::from(builder);
@@ -239,18 +238,38 @@ fn build(
     Ok((content, report))
 }
 
+/// The sections of the scene, and the report on it.
+fn scene_rows(
+    manifest: &Manifest,
+    plan: &ScenePlan<'_>,
+    objects: &mut Objects,
+    context: &Context<'_>,
+) -> Result<(FileBuilder<'static>, SceneReport)> {
+    let mut nodes = context.keeper.pieces();
+    let mut take = |rows: &[Node]| nodes.add(rows.as_bytes());
+    let (parts, groups) = encode::encode(manifest, &plan.order, &plan.visible, &objects.number, &mut take)?;
+    let (nodes, hash) = nodes.finish()?;
+    let mut builder = FileBuilder::new();
+    write::scene(&mut builder, &parts)?;
+    if nodes.len() > 0 {
+        let head = SectionHead { kind: kind::NODES, object: NONE, stride: size_of::<Node>() as u32, hash };
+        builder.hashed_section(head, None, nodes)?;
+    }
+    builder.move_large(&mut |bytes: &[u8]| context.keeper.keep_bytes(bytes))?;
+    Ok((builder.into_static(), report(manifest, plan, objects, &parts, groups.as_ref())))
+}
+
 /// The report on a compiled scene.
 fn report(
     manifest: &Manifest,
     plan: &ScenePlan<'_>,
     objects: &mut Objects,
     parts: &SceneParts,
+    groups: Option<&Groups>,
 ) -> SceneReport {
     let triangles = |object: u32| objects.reports[object as usize].triangles;
-    let view = SceneView { nodes: &parts.nodes, instances: &parts.instances, ..SceneView::default() };
-    let groups = Groups::of(&view);
-    let world = groups.as_ref().map_or(0, |groups| groups.world() as usize);
-    let group_of = |node: u32| groups.as_ref().map_or(0, |groups| groups.of_node(node) as usize);
+    let world = groups.map_or(0, |groups| groups.world() as usize);
+    let group_of = |node: u32| groups.map_or(0, |groups| groups.of_node(node) as usize);
     // For each group and the world its instances and their triangles, once groups are written out.
     let mut written_out = vec![(0u64, 0u64); world + 1];
     for instance in &parts.instances {
@@ -265,7 +284,7 @@ fn report(
     SceneReport {
         seconds: Vec::new(),
         unused: unused.map(|(object, _)| object.name.clone()).collect(),
-        nodes: parts.nodes.len() as u64,
+        nodes: plan.order.len() as u64,
         instances: written_out[world].0,
         rows: parts.instances.len() as u64,
         tracks: parts.tracks.len() as u64,
@@ -285,21 +304,23 @@ fn report(
 }
 
 /// Checks the first frame as a reader does. The sections of the objects have been checked one by
-/// one before, so the check reads a file with their OBJECT rows only; the whole file where objects
-/// deform. Returns the trees that the file may hold.
-fn check(objects: &Objects, parts: SceneParts, builder: &FileBuilder<'static>, name: &Path) -> Result<Trees> {
+/// one before, so the check reads a file with their OBJECT rows and the `rows` of the scene only;
+/// the whole file where objects deform. Returns the trees that the file may hold.
+fn check(
+    objects: &Objects,
+    mut rows: FileBuilder<'static>,
+    builder: &FileBuilder<'static>,
+    (deforms, name): (bool, &Path),
+    context: &Context<'_>,
+) -> Result<Trees> {
     let whole = || Content::from(builder.clone());
-    if !parts.deformers.deformers.is_empty() {
+    if deforms {
         let opened = bth::from_bytes(&whole().bytes()?).map(drop);
         return opened.map(|()| Trees::default()).map_err(|e| refused(name, &e));
     }
-    let mut rows_only = FileBuilder::new();
-    objects.write_rows(&mut rows_only)?;
-    write::scene(&mut rows_only, &parts)?;
-    let file = write::assembled(&rows_only)?;
+    objects.write_rows(&mut rows)?;
     // A scene may have millions of rows, so they are not in memory twice.
-    drop(rows_only);
-    drop(parts);
+    let file = context.keeper.assembled(rows)?;
     let error = match bth::check_first_frame(&file) {
         Ok(trees) => return Ok(trees),
         Err(error) => error,

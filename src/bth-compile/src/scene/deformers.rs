@@ -59,7 +59,7 @@ pub(super) fn check(
         let Some(number) = objects[deformer.object] else { continue };
         let object = &manifest.objects[deformer.object].name;
         let refused = |message: String, hint: &str| {
-            let part = format!("deformer of node \"{}\"", manifest.nodes[deformer.node].name.escape_debug());
+            let part = format!("deformer of node \"{}\"", manifest.nodes.name(deformer.node).escape_debug());
             let place = Place::Part(name.to_owned(), part);
             Err(Error::Input { code: "BTH-I052", place, message, hint: hint.to_owned() })
         };

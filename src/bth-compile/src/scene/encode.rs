@@ -3,7 +3,6 @@
 use super::deformers;
 use crate::error::{Error, Result};
 use crate::write::{Names, SceneParts};
-use bth_format::SceneView;
 use bth_format::groups::Groups;
 use bth_format::layout as on_disk;
 use bth_format::layout::NONE;
@@ -28,7 +27,7 @@ fn groups(manifest: &Manifest) -> Option<NodeGroups> {
 fn parents_first(manifest: &Manifest) -> Vec<usize> {
     let nodes = &manifest.nodes;
     let mut order: Vec<usize> = (0..nodes.len()).collect();
-    if nodes.iter().enumerate().all(|(row, node)| node.parent.is_none_or(|parent| parent < row)) {
+    if (0..nodes.len()).all(|row| nodes.parent(row).is_none_or(|parent| parent < row)) {
         return order;
     }
     let mut depth = vec![usize::MAX; nodes.len()];
@@ -37,7 +36,7 @@ fn parents_first(manifest: &Manifest) -> Vec<usize> {
         let mut next = Some(start);
         while let Some(node) = next.filter(|node| depth[*node] == usize::MAX) {
             path.push(node);
-            next = nodes[node].parent;
+            next = nodes.parent(node);
         }
         let mut below = next.map_or(0, |node| depth[node] + 1);
         while let Some(node) = path.pop() {
@@ -49,18 +48,23 @@ fn parents_first(manifest: &Manifest) -> Vec<usize> {
     order
 }
 
+/// Nodes that are passed on at a time.
+const CHUNK: usize = 1 << 13;
+
 /// Encodes the scene sections. `objects` gives for each object of the manifest the object of the
 /// file, `None` for those that no instance uses. `visible` is true for each node that may be seen;
-/// instances at other nodes are skipped.
+/// instances at other nodes are skipped. The rows of nodes go to `take` in pieces, since they may
+/// not fit in memory. Returns all other rows, and the groups.
 ///
 /// # Errors
-/// `BTH-L050` beyond the limits of the format.
+/// `BTH-L050` beyond the limits of the format; errors of `take`.
 pub(super) fn encode(
     manifest: &Manifest,
     order: &[usize],
     visible: &[bool],
     objects: &[Option<u32>],
-) -> Result<SceneParts> {
+    take: &mut dyn FnMut(&[on_disk::Node]) -> Result<()>,
+) -> Result<(SceneParts, Option<Groups>)> {
     check_limits(manifest)?;
     let mut row_of = vec![NONE; manifest.nodes.len()];
     order.iter().enumerate().for_each(|(row, node)| row_of[*node] = row as u32);
@@ -74,7 +78,7 @@ pub(super) fn encode(
             camera: manifest.camera.map_or(NONE, |camera| camera as u32),
             reserved: [0; 11],
         },
-        nodes: Vec::with_capacity(order.len()),
+        nodes: Vec::new(),
         instances: Vec::new(),
         tracks: Vec::new(),
         times: Vec::new(),
@@ -90,15 +94,20 @@ pub(super) fn encode(
         cameras.chain(manifest.lights.iter().map(|light| light.name.as_str())).collect();
     let groups = groups(manifest);
     let is_group = |node: usize| groups.as_ref().is_some_and(|groups| groups.is_group(node));
+    let mut nodes = Vec::with_capacity(CHUNK.min(order.len()));
     for (row, &index) in order.iter().enumerate() {
-        let node = &manifest.nodes[index];
-        let (name, name_length) = match others.contains(node.name.as_str()) {
-            true => names.add(&node.name),
-            false => names.append(&node.name),
+        let node = manifest.nodes.get(index);
+        let (name, name_length) = match others.contains(node.name) {
+            true => names.add(node.name),
+            false => names.append(node.name),
         };
         let (transform, matrix) = transform(&node.transform);
         let hidden = if node.visible { 0 } else { on_disk::NODE_HIDDEN };
-        parts.nodes.push(on_disk::Node {
+        if nodes.len() == CHUNK {
+            take(&nodes)?;
+            nodes.clear();
+        }
+        nodes.push(on_disk::Node {
             transform,
             parent: node.parent.map_or(NONE, |parent| row_of[parent]),
             flags: hidden | matrix | if is_group(index) { on_disk::NODE_GROUP } else { 0 },
@@ -114,19 +123,22 @@ pub(super) fn encode(
             parts.instances.push(on_disk::Instance { node: row as u32, object, flags, first: 0 });
         }
     }
-    number_instances(&parts.nodes, &mut parts.instances);
+    take(&nodes)?;
+    let rows =
+        order.iter().map(|&node| (manifest.nodes.parent(node).map(|parent| row_of[parent]), is_group(node)));
+    let groups = groups.is_some().then(|| Groups::of_rows(rows)).flatten();
+    number_instances(groups.as_ref(), &mut parts.instances);
     add_tracks(&mut parts, manifest, &row_of);
     add_cameras(&mut parts, &mut names, manifest, &row_of);
     add_lights(&mut parts, &mut names, manifest, &row_of);
     parts.names = names.bytes;
-    Ok(parts)
+    Ok((parts, groups))
 }
 
 /// Gives each row the number of its first instance. Where there are too many, the check of the
 /// scene says so.
-fn number_instances(nodes: &[on_disk::Node], instances: &mut [on_disk::Instance]) {
-    let view = SceneView { nodes, ..SceneView::default() };
-    match Groups::of(&view) {
+fn number_instances(groups: Option<&Groups>, instances: &mut [on_disk::Instance]) {
+    match groups {
         Some(groups) => drop(groups.number(instances)),
         None => (0..).zip(instances).for_each(|(row, instance)| instance.first = row),
     }
@@ -179,23 +191,22 @@ fn add_lights(parts: &mut SceneParts, names: &mut Names, manifest: &Manifest, ro
 }
 
 fn check_limits(manifest: &Manifest) -> Result<()> {
-    let name = |n: &String| n.len() as u64;
-    let names = manifest.nodes.iter().map(|n| name(&n.name)).sum::<u64>()
-        + manifest.cameras.iter().map(|c| name(&c.name)).sum::<u64>()
-        + manifest.lights.iter().map(|l| name(&l.name)).sum::<u64>();
+    let names = || {
+        let nodes = (0..manifest.nodes.len()).map(|node| manifest.nodes.name(node));
+        let cameras = manifest.cameras.iter().map(|camera| camera.name.as_str());
+        nodes.chain(cameras).chain(manifest.lights.iter().map(|light| light.name.as_str()))
+    };
+    let bytes = names().map(|name| name.len() as u64).sum();
     let values = manifest.tracks.iter().map(|t| t.values.len() as u64).sum();
     for (what, count) in
-        [("nodes", manifest.nodes.len() as u64), ("bytes of names", names), ("values", values)]
+        [("nodes", manifest.nodes.len() as u64), ("bytes of names", bytes), ("values", values)]
     {
         if count >= u64::from(i32::MAX as u32) {
             let message = format!("a scene may have fewer than {} {what}; this one has {count}", i32::MAX);
             return Err(Error::Limit { code: "BTH-L050", message });
         }
     }
-    let nodes = manifest.nodes.iter().map(|n| &n.name);
-    let names = nodes.chain(manifest.cameras.iter().map(|c| &c.name));
-    let mut names = names.chain(manifest.lights.iter().map(|l| &l.name));
-    if let Some(long) = names.find(|name| name.len() > bth_format::limits::MAX_NAME as usize) {
+    if let Some(long) = names().find(|name| name.len() > bth_format::limits::MAX_NAME as usize) {
         let (start, most) = (long.chars().take(40).collect::<String>(), bth_format::limits::MAX_NAME);
         let message =
             format!("a name may have {most} bytes; the one that starts \"{start}\" has {}", long.len());

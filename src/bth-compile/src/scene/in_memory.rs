@@ -13,8 +13,9 @@ use crate::options::CompileOptions;
 use crate::pipeline::CachedCompilation;
 use crate::source::{SourceDigest, TriangleMesh};
 use crate::stage::Clock;
-use bth_scene::{Manifest, Node, Object, Source, Transform};
+use bth_scene::{Manifest, Node, Nodes, Object, Source, Transform};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -80,27 +81,26 @@ fn check(meshes: usize, instances: &[Instance]) -> Result<()> {
 
 /// The manifest of a scene in which each instance has a separate node.
 fn manifest(meshes: usize, instances: &[Instance], names: SceneNames<'_>) -> Manifest {
-    let named = |names: Option<&[String]>, row: usize, other: &dyn Fn() -> String| {
-        names.and_then(|names| names.get(row).cloned()).unwrap_or_else(other)
-    };
+    fn named(names: Option<&[String]>, row: usize, other: impl Fn() -> String) -> Cow<'_, str> {
+        names.and_then(|names| names.get(row)).map_or_else(|| other().into(), |name| name.into())
+    }
     let object = |row| {
         let path = format!("mesh {row}");
-        let name = named(names.meshes, row, &|| path.clone());
+        let name = named(names.meshes, row, || path.clone());
         Object::new(name, Source::Model { path, mesh: None })
     };
-    let node = |(row, instance): (usize, &Instance)| Node {
-        name: named(names.instances, row, &|| format!("instance {row}")),
-        parent: None,
-        transform: Transform::Matrix(instance.to_world),
-        object: Some(instance.mesh as usize),
-        group: None,
-        visible: true,
-    };
-    Manifest {
-        objects: (0..meshes).map(object).collect(),
-        nodes: instances.iter().enumerate().map(node).collect(),
-        ..Manifest::default()
+    let mut nodes = Nodes::with_capacity(instances.len());
+    for (row, instance) in instances.iter().enumerate() {
+        nodes.push(Node {
+            name: &named(names.instances, row, || format!("instance {row}")),
+            parent: None,
+            transform: Transform::Matrix(instance.to_world),
+            object: Some(instance.mesh as usize),
+            group: None,
+            visible: true,
+        });
     }
+    Manifest { objects: (0..meshes).map(object).collect(), nodes, ..Manifest::default() }
 }
 
 /// The plan of a manifest made by [`manifest`]. All instances count as visible: if one without size

@@ -5,14 +5,17 @@ use super::sections::ObjectSections;
 use crate::cached::Cache;
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
-use crate::write::{Bytes, DiskFile};
+use crate::write::{Bytes, DiskFile, FileBuilder, assembled, defect, unread};
 use bth_cache::Record;
 use bth_format::file::read_table;
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Bytes of objects that are kept in memory.
 const MEMORY: u64 = 64 << 20;
+/// Bytes of a section that are collected before they go to disk.
+const IN_PIECES: usize = 16 << 20;
 /// Bytes of a file without a name. A scene may need many of them: each is gone when the last of its
 /// sections has been written.
 const SPOOL: u64 = 1 << 30;
@@ -91,12 +94,35 @@ impl Keeper {
     }
 
     fn append(&self, spool: &Arc<DiskFile>, bytes: &[u8]) -> Result<Bytes<'static>> {
-        let range = spool.append(bytes).map_err(|e| Error::File {
+        let range = spool.append(bytes).map_err(|e| self.unwritten(&e))?;
+        Ok(Bytes::OnDisk(spool.clone(), range))
+    }
+
+    /// A section that is made in pieces.
+    pub(super) fn pieces(&self) -> Pieces<'_> {
+        Pieces { keeper: self, bytes: Vec::new(), file: None, written: 0, hasher: blake3::Hasher::new() }
+    }
+
+    /// The file of a builder, which need not stay in memory. Its header and table have been checked.
+    ///
+    /// # Errors
+    /// The errors of [`assembled`]; `BTH-O020` when it cannot be written to disk.
+    pub(super) fn assembled(&self, builder: FileBuilder<'_>) -> Result<bth_format::File> {
+        let Some(folder) = self.folder.as_ref().filter(|_| builder.file_length() > self.memory) else {
+            return assembled(&builder);
+        };
+        let write = |file: &mut std::fs::File| builder.write_to(&mut |bytes| file.write_all(bytes));
+        let map = bth_files::mapped(folder, write);
+        let map = map.map_err(|e| unread(&e).unwrap_or_else(|| self.unwritten(&e)))?;
+        bth_format::File::from_map(map).map_err(defect)
+    }
+
+    fn unwritten(&self, error: &std::io::Error) -> Error {
+        Error::File {
             code: "BTH-O020",
             path: self.folder.clone().unwrap_or_default(),
-            message: format!("cannot write a temporary file: {e}"),
-        })?;
-        Ok(Bytes::OnDisk(spool.clone(), range))
+            message: format!("cannot write a temporary file: {error}"),
+        }
     }
 
     /// The file that takes these bytes; `None` while memory has room for them.
@@ -135,6 +161,60 @@ impl Keeper {
         let pin = cache.pin(record, monitor)?;
         let table = read_table(&pin.path).ok()?;
         ObjectSections::on_disk(&Arc::new(DiskFile::open(&pin.path, pin.file)), &table, 0).ok()
+    }
+}
+
+/// A section that is made in pieces: in memory while it is small, then in a separate file.
+pub(super) struct Pieces<'a> {
+    keeper: &'a Keeper,
+    /// What is not in the file.
+    bytes: Vec<u8>,
+    file: Option<Arc<DiskFile>>,
+    /// Bytes in the file.
+    written: u64,
+    hasher: blake3::Hasher,
+}
+
+impl Pieces<'_> {
+    /// Adds a piece.
+    ///
+    /// # Errors
+    /// `BTH-O020` when it cannot be written to disk.
+    pub(super) fn add(&mut self, piece: &[u8]) -> Result<()> {
+        self.hasher.update(piece);
+        self.bytes.extend_from_slice(piece);
+        if self.bytes.len() < IN_PIECES {
+            return Ok(());
+        }
+        if let (None, Some(folder)) = (&self.file, &self.keeper.folder) {
+            // Where no file can be made, memory has to do.
+            let file = bth_files::nameless(folder).ok();
+            self.file = file.map(|file| Arc::new(DiskFile::open(folder, file)));
+        }
+        self.flush()
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        if let Some(file) = &self.file {
+            file.append(&self.bytes).map_err(|e| self.keeper.unwritten(&e))?;
+            self.written += self.bytes.len() as u64;
+            self.bytes.clear();
+        }
+        Ok(())
+    }
+
+    /// The bytes of the section and their hash.
+    ///
+    /// # Errors
+    /// The errors of [`Self::add`].
+    pub(super) fn finish(mut self) -> Result<(Bytes<'static>, [u8; 16])> {
+        self.flush()?;
+        let hash = self.hasher.finalize().as_bytes()[..16].try_into().expect("32 bytes hold 16");
+        let bytes = match self.file {
+            Some(file) => Bytes::OnDisk(file, 0..self.written),
+            None => Bytes::Owned(self.bytes.into()),
+        };
+        Ok((bytes, hash))
     }
 }
 

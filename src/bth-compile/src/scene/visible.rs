@@ -22,7 +22,7 @@ pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
     }
     let mut with_size = vec![false; manifest.nodes.len()];
     for &node in order {
-        let parent = manifest.nodes[node].parent;
+        let parent = manifest.nodes.parent(node);
         shown[node] &= parent.is_none_or(|parent| shown[parent]);
         with_size[node] = scaled[node] && parent.is_none_or(|parent| with_size[parent]);
     }
@@ -47,7 +47,7 @@ pub(super) fn flattened(manifest: &Manifest) -> Vec<&str> {
     };
     let nodes = manifest.nodes.iter().enumerate();
     let flat = nodes.filter(|(row, node)| node.visible && is_flat(&node.transform) && !has_track[*row]);
-    flat.map(|(_, node)| node.name.as_str()).collect()
+    flat.map(|(_, node)| node.name).collect()
 }
 
 fn has_size(transform: &Transform) -> bool {

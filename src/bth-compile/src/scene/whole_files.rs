@@ -104,7 +104,7 @@ impl Expansion<'_> {
 
     fn add_node(&mut self, name: String, parent: Option<usize>, object: Option<usize>) {
         let transform = Transform::default();
-        self.manifest.nodes.push(Node { name, parent, transform, object, group: None, visible: true });
+        self.manifest.nodes.push(Node { name: &name, parent, transform, object, group: None, visible: true });
     }
 
     /// Adds an instance of each object of a file without a scene.
@@ -135,20 +135,23 @@ impl Expansion<'_> {
             };
             let name = self.name(view.node_name(i as u32));
             let visible = node.flags & NODE_HIDDEN == 0;
-            self.manifest.nodes.push(Node { name, parent, transform, object: None, group: None, visible });
+            let node = Node { name: &name, parent, transform, object: None, group: None, visible };
+            self.manifest.nodes.push(node);
         }
         for instance in view.instances {
             let mut node = row(instance.node);
-            if self.manifest.nodes[node].object.is_some() || self.manifest.nodes[node].group.is_some() {
+            let Node { object, group, .. } = self.manifest.nodes.get(node);
+            if object.is_some() || group.is_some() {
                 // A node of a manifest has one instance; the others are at nodes below.
                 let name = self.name(view.node_name(instance.node));
                 self.add_node(name, Some(node), None);
                 node = self.manifest.nodes.len() - 1;
             }
-            match instance.group() {
-                Some(group) => self.manifest.nodes[node].group = Some(row(group)),
-                None => self.manifest.nodes[node].object = Some(self.object(instance.object)),
-            }
+            let (object, group) = match instance.group() {
+                Some(group) => (None, Some(row(group))),
+                None => (Some(self.object(instance.object)), None),
+            };
+            self.manifest.nodes.set_shown(node, object, group);
         }
         for track in view.tracks {
             let property = match on_disk::Property::from_code(track.property) {
@@ -175,9 +178,10 @@ impl Expansion<'_> {
 
     /// Makes the instances of the object that named the file instances of the group.
     fn show(&mut self) {
-        for node in &mut self.manifest.nodes[..self.group] {
-            if node.object == Some(self.row) {
-                (node.object, node.group) = (None, Some(self.group));
+        let nodes = &mut self.manifest.nodes;
+        for node in 0..self.group {
+            if nodes.object(node) == Some(self.row) {
+                nodes.set_shown(node, None, Some(self.group));
             }
         }
     }

@@ -109,6 +109,14 @@ impl File {
         Self::new(Buffer::Owned(memory.0))
     }
 
+    /// As [`Self::from_bytes`], of a mapped file, without copying the bytes.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_map(map: memmap2::Mmap) -> Result<Self> {
+        Self::new(Buffer::Mapped(map, false))
+    }
+
     /// Maps a file and checks the header and the section table. Pages are read when they are used.
     ///
     /// # Safety

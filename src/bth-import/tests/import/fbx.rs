@@ -26,22 +26,22 @@ fn a_scene_has_the_nodes_instances_and_keys_of_the_file() {
     let (manifest, report) = manifest(SCENE);
     assert_eq!(report.space.as_deref(), Some("units of 0.01 m, z up; read as metres with y up"));
     let node = |name: &str| manifest.nodes.iter().position(|node| node.name == name).unwrap();
-    let parent = |name: &str| manifest.nodes[node(name)].parent;
+    let parent = |name: &str| manifest.nodes.get(node(name)).parent;
     assert_eq!(
         [parent("First"), parent("Second"), parent("Hidden")],
         [Some(0), Some(0), Some(node("First"))]
     );
-    assert!(!manifest.nodes[node("Hidden")].visible);
+    assert!(!manifest.nodes.get(node("Hidden")).visible);
     // The plate is there once for each material, and behind its geometric transform.
-    let object = |name: &str| manifest.nodes[node(name)].object.unwrap();
+    let object = |name: &str| manifest.nodes.get(node(name)).object.unwrap();
     assert_eq!(manifest.objects[object("First")].name, "Plate");
     assert_ne!(object("First"), object("Second/geometry"));
     assert_eq!(parent("Second/geometry"), Some(node("Second")));
-    let Transform::Parts { translation, .. } = &manifest.nodes[node("Second/geometry")].transform else {
+    let Transform::Parts { translation, .. } = manifest.nodes.get(node("Second/geometry")).transform else {
         panic!()
     };
-    assert_eq!(*translation, [0.0, 0.0, 100.0]);
-    let Transform::Parts { scale, rotation, .. } = &manifest.nodes[0].transform else { panic!() };
+    assert_eq!(translation, [0.0, 0.0, 100.0]);
+    let Transform::Parts { scale, rotation, .. } = manifest.nodes.get(0).transform else { panic!() };
     assert!(scale.iter().all(|s| (s - 0.01).abs() < 1e-12) && rotation[0] < -0.7, "{scale:?} {rotation:?}");
     // The keys begin at 0. The bone moves nothing, and the shape swells.
     let track = |name: &str, property| {

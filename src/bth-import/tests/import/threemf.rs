@@ -53,7 +53,7 @@ fn a_scene_has_what_is_built_and_its_components() {
     let listener = Listener::default();
     let (manifest, report) = manifest(&of(ROOT), &listener);
     assert_eq!(report.space.as_deref(), Some("units of 0.0254 m, z up; read as metres with y up"));
-    let parents: Vec<_> = manifest.nodes.iter().map(|node| (node.name.as_str(), node.parent)).collect();
+    let parents: Vec<_> = manifest.nodes.iter().map(|node| (node.name, node.parent)).collect();
     let expected = [
         ("root", None),
         ("Both", Some(0)),
@@ -66,15 +66,15 @@ fn a_scene_has_what_is_built_and_its_components() {
         ("Far/mesh", Some(7)),
     ];
     assert_eq!(parents, expected);
-    let matrix = |node: usize| match &manifest.nodes[node].transform {
-        Transform::Matrix(rows) => *rows,
+    let matrix = |node: usize| match manifest.nodes.get(node).transform {
+        Transform::Matrix(rows) => rows,
         Transform::Parts { .. } => panic!("expected a matrix"),
     };
     let unit = 0.0254;
     assert_eq!(matrix(0), [[unit, 0., 0., 0.], [0., 0., unit, 0.], [0., -unit, 0., 0.]]);
     assert_eq!(matrix(3), [[0., -1., 0., 10.], [1., 0., 0., 0.], [0., 0., 1., 0.]]);
     // Positions in f32 are relative to the middle.
-    let Transform::Parts { translation, .. } = &manifest.nodes[8].transform else { panic!() };
+    let Transform::Parts { translation, .. } = manifest.nodes.get(8).transform else { panic!() };
     assert!((translation[0] - 6e9).abs() < 1e3);
     assert!(listener.heard(
         "elements \"beamlattice\" of beamlattice/2017/02 are left out, the first at 3D/3dmodel.model line 19"

@@ -2,7 +2,7 @@
 
 use super::group_row::object_of_group;
 use super::groups::{self, RowPlace};
-use super::placement::{PlacementError, Unplaceable};
+use super::placement::{PlacementError, RowBox, Unplaceable};
 use super::stored::StoredRows;
 use super::top_level::TopLevel;
 use super::world::{InstanceRow, NewInstance, TransformSource, World, scene_of};
@@ -109,6 +109,35 @@ impl World {
         world.evaluate_nodes(objects, seconds, true);
         world.place_moved(objects, seconds, &[], true)?;
         Ok(world)
+    }
+
+    /// The boxes of the visible rows of a scene without groups and deformers at its first frame. It
+    /// has been checked.
+    ///
+    /// # Errors
+    /// The errors of [`Self::update`].
+    pub(super) fn first_boxes(objects: &Objects, view: &SceneView<'_>) -> Result<Vec<(u32, RowBox)>> {
+        let seconds = f64::from(view.scene[0].first_frame) / view.scene[0].rate;
+        let source = TransformSource::File(NodeHierarchy::new(view, 0));
+        let mut world = World::unplaced(source, seconds, 0, objects.count());
+        world.evaluate_nodes(objects, seconds, true);
+        let TransformSource::File(hierarchy) = &world.source else { return Ok(Vec::new()) };
+        let new = |row: u32| {
+            let &Instance { node, object, .. } = &view.instances[row as usize];
+            let row = InstanceRow { object, within: NONE, node, to_world: hierarchy.to_world(view, node) };
+            NewInstance { row, visible: !hierarchy.hidden(node) }
+        };
+        let (mut boxes, mut placed) = (Vec::new(), Vec::new());
+        let count = view.instances.len() as u32;
+        for first in (0..count).step_by(CHUNK) {
+            let rows = (first..count.min(first + CHUNK as u32)).collect::<Vec<_>>();
+            world.place_all(objects, &rows, &new, &mut placed);
+            for (row, placed) in rows.into_iter().zip(&placed) {
+                let placed = placed.map_err(|error| unplaceable(objects, seconds, row, error))?;
+                boxes.extend(placed.map(|placed| (row, placed.row_box())));
+            }
+        }
+        Ok(boxes)
     }
 
     /// An instance of each object, in its place. It has the index of the object.

@@ -26,7 +26,7 @@ fn entry(ray: &Ray, [lower, upper]: [[f32; 3]; 2]) -> f64 {
 /// The world boxes of the visible instances.
 fn boxes(world: &World) -> Vec<(u32, [[f32; 3]; 2])> {
     let visible = world.placements.iter().zip(0..).filter(|(placement, _)| placement.is_some());
-    visible.map(|(_, i)| (i, ends(&world.top.bounds_of(world.placement(i))))).collect()
+    visible.map(|(_, i)| (i, ends(&world.top.bounds_of(&world.placement(i).row_box())))).collect()
 }
 
 #[test]

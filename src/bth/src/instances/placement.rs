@@ -29,6 +29,16 @@ pub(crate) struct Placement {
     pub(crate) accuracy: Accuracy,
 }
 
+/// The world box of a visible row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowBox {
+    pub(crate) lower: [f32; 3],
+    pub(crate) upper: [f32; 3],
+    /// The part of the rounding that depends on the ray: the box must be enlarged on all sides by
+    /// this factor times the max |coordinate| of the ray's origin.
+    pub(crate) origin_slack: f32,
+}
+
 /// Number of boxes that are computed together.
 const BLOCK: usize = 4;
 
@@ -223,10 +233,10 @@ impl Placement {
         if finite { Ok(placement) } else { Err(PlacementError::NotFinite) }
     }
 
-    /// The part of the rounding that depends on the ray: the box must be enlarged on all sides by
-    /// this factor times the max |coordinate| of the ray's origin.
-    pub(crate) fn origin_slack(&self) -> f32 {
-        ((ROUNDING * self.accuracy.condition()) as f32).next_up()
+    /// The box of the instance.
+    pub(crate) fn row_box(&self) -> RowBox {
+        let Placement { lower, upper, .. } = *self;
+        RowBox { lower, upper, origin_slack: ((ROUNDING * self.accuracy.condition()) as f32).next_up() }
     }
 
     /// The line in the space of the object, as [`Inverse::line`].

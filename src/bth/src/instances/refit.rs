@@ -3,7 +3,7 @@
 //! that share one move apart. [`CostRatio`](super::top_nodes::CostRatio) tells how much.
 
 use super::placement::Placement;
-use super::top_level::TopLevel;
+use super::top_level::{PlacedRows, TopLevel};
 use super::top_nodes::{INSTANCE, InstanceBounds, TreeLines, node_mut, put_bounds, used};
 use crate::parallel::Tasks;
 use bth_format::layout::{CacheLine, NODE_LINES, WIDTH, WideNode};
@@ -16,7 +16,7 @@ impl TopLevel {
     /// Computes all boxes again after instances have moved. The visible instances are those for
     /// which the BVH was built.
     pub(crate) fn refit(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
-        self.measure(placements, rows);
+        self.measure(&PlacedRows { placements, rows, first: self.first_row });
         let TreeLines::Own(mut lines) = std::mem::take(&mut self.lines) else { return };
         TASKS.for_each(&mut lines, |_, lines| self.refit_instances(lines, placements));
         // Children come behind their parents, so that their boxes are final when the parent is
@@ -46,7 +46,7 @@ impl TopLevel {
                 if code & INSTANCE != 0
                     && let Some(placement) = &placements[((code & !INSTANCE) - self.first_row) as usize]
                 {
-                    put_bounds(node, slot, &self.bounds_of(placement));
+                    put_bounds(node, slot, &self.bounds_of(&placement.row_box()));
                 }
             }
         }

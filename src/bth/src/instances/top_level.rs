@@ -4,7 +4,7 @@
 //! Sixteen instances or fewer become the children of one node. Splitting them further would give
 //! nodes with two or three children, whose empty slots cost memory and time.
 
-use super::placement::Placement;
+use super::placement::{Placement, RowBox};
 use super::top_nodes::{CostRatio, INSTANCE, InstanceBounds, TopNodes, TreeLines, node_mut, put_bounds};
 use bth_format::file::File;
 use bth_format::layout::{CacheLine, NODE_LINES, NONE, Tree, WIDTH, WideNode, kind};
@@ -30,7 +30,7 @@ pub(crate) struct TopLevel {
     /// `origin_slack` times that
     /// |coordinate|.
     pub(crate) reach: f32,
-    /// Max [`Placement::origin_slack`] of the instances.
+    /// Max [`RowBox::origin_slack`] of the instances.
     pub(crate) origin_slack: f32,
     /// The cube that holds all boxes in the nodes, for the preparation of rays.
     pub(super) cube: ObjectBounds,
@@ -128,8 +128,13 @@ struct BuildTask {
 impl TopLevel {
     /// Builds the BVH over the visible instances, or over the visible ones of some rows.
     pub(crate) fn build(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
+        self.build_over(PlacedRows { placements, rows, first: self.first_row });
+    }
+
+    /// Builds the BVH over rows.
+    pub(super) fn build_over(&mut self, rows: impl VisibleRows) {
         // There is rarely more than one node for every seven instances.
-        let count = rows.map_or(placements.len(), <[u32]>::len);
+        let count = rows.max_count();
         let mut lines = match std::mem::take(&mut self.lines) {
             TreeLines::Own(lines) => lines,
             TreeLines::Stored(..) => Vec::new(),
@@ -137,11 +142,10 @@ impl TopLevel {
         lines.clear();
         lines.reserve_exact((count / 7 + 1) * NODE_LINES);
         self.depth = 0;
-        self.measure(placements, rows);
+        self.measure(&rows);
         let mut items = Vec::with_capacity(count);
-        for_each_visible(placements, (rows, self.first_row), |instance, placement| {
-            items.push(BuildItem::new(self.bounds_of(placement), instance));
-        });
+        rows.for_each(|row, of| items.push(BuildItem::new(self.bounds_of(&of), row)));
+        drop(rows);
         self.build_from(&mut lines, &mut items);
         self.cost = CostRatio::of_new(&lines);
         self.lines = TreeLines::Own(lines);
@@ -165,12 +169,12 @@ impl TopLevel {
     }
 
     /// Sets what rays need to know about all boxes.
-    pub(super) fn measure(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
+    pub(super) fn measure(&mut self, rows: &impl VisibleRows) {
         let (mut extent, mut origin_slack) = (0.0f32, 0.0f32);
-        for_each_visible(placements, (rows, self.first_row), |_, placement| {
-            origin_slack = origin_slack.max(placement.origin_slack());
+        rows.for_each(|_, of| {
+            origin_slack = origin_slack.max(of.origin_slack);
             for k in 0..3 {
-                let greater = placement.upper[k].abs().max(placement.lower[k].abs());
+                let greater = of.upper[k].abs().max(of.lower[k].abs());
                 extent = extent.max(greater);
             }
         });
@@ -184,13 +188,13 @@ impl TopLevel {
         self.cube = ObjectBounds::around(self.greatest_coordinate());
     }
 
-    /// The world box of an instance, widened for rays from within the reach.
-    pub(super) fn bounds_of(&self, placement: &Placement) -> InstanceBounds {
-        let pad = (placement.origin_slack() * self.reach).next_up();
+    /// The world box of a row, widened for rays from within the reach.
+    pub(super) fn bounds_of(&self, of: &RowBox) -> InstanceBounds {
+        let pad = (of.origin_slack * self.reach).next_up();
         let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
         for k in 0..3 {
-            lower[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
-            upper[k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
+            lower[k] = -((of.lower[k] - pad).next_down().max(f32::MIN));
+            upper[k] = (of.upper[k] + pad).next_up().min(f32::MAX);
         }
         InstanceBounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
     }
@@ -251,6 +255,14 @@ impl TopLevel {
         self.lines.nodes()
     }
 
+    /// The lines of the nodes of a tree that was built.
+    pub(super) fn into_lines(self) -> Vec<CacheLine> {
+        match self.lines {
+            TreeLines::Own(lines) => lines,
+            TreeLines::Stored(..) => Vec::new(),
+        }
+    }
+
     /// Returns true if no instance is visible.
     pub(crate) fn is_empty(&self) -> bool {
         self.lines.is_empty()
@@ -270,21 +282,48 @@ impl TopLevel {
     }
 }
 
-/// Calls `visit` with the visible instances, or with the visible ones of some rows. The placements
-/// begin with row `first`.
-fn for_each_visible(
-    placements: &[Option<Placement>],
-    (rows, first): (Option<&[u32]>, u32),
-    mut visit: impl FnMut(u32, &Placement),
-) {
-    match rows {
-        None => {
-            let placements = placements.iter().enumerate();
-            placements.for_each(|(i, placement)| placement.iter().for_each(|p| visit(i as u32, p)));
+/// The visible rows over which a tree is built.
+pub(super) trait VisibleRows {
+    /// Calls `visit` with each row and its box.
+    fn for_each(&self, visit: impl FnMut(u32, RowBox));
+    /// Number of rows, or more.
+    fn max_count(&self) -> usize;
+}
+
+/// The visible ones of all rows that are placed, or of some.
+pub(super) struct PlacedRows<'a> {
+    pub(super) placements: &'a [Option<Placement>],
+    pub(super) rows: Option<&'a [u32]>,
+    /// The row of the first placement.
+    pub(super) first: u32,
+}
+
+impl VisibleRows for PlacedRows<'_> {
+    fn for_each(&self, mut visit: impl FnMut(u32, RowBox)) {
+        let mut visit = |row: u32, placement: &Option<Placement>| {
+            placement.iter().for_each(|placement| visit(row, placement.row_box()));
+        };
+        match self.rows {
+            None => (0..).zip(self.placements).for_each(|(row, placement)| visit(row, placement)),
+            Some(rows) => {
+                rows.iter().for_each(|&row| visit(row, &self.placements[(row - self.first) as usize]));
+            }
         }
-        Some(rows) => {
-            rows.iter().for_each(|&i| placements[(i - first) as usize].iter().for_each(|p| visit(i, p)));
-        }
+    }
+
+    fn max_count(&self) -> usize {
+        self.rows.map_or(self.placements.len(), <[u32]>::len)
+    }
+}
+
+/// Rows with their boxes.
+impl VisibleRows for Vec<(u32, RowBox)> {
+    fn for_each(&self, mut visit: impl FnMut(u32, RowBox)) {
+        self.iter().for_each(|(row, of)| visit(*row, *of));
+    }
+
+    fn max_count(&self) -> usize {
+        self.len()
     }
 }
 

@@ -5,6 +5,7 @@ use super::top_level::TopLevel;
 use super::world::scene_of;
 use crate::objects::Objects;
 use bth_format::SceneView;
+use bth_format::error::Result;
 use bth_format::groups::Groups;
 use bth_format::layout::{CacheLine, Instance, NONE, Tree};
 use bth_format::limits::MAX_STORED_LEVELS;
@@ -20,7 +21,7 @@ pub struct Trees {
 }
 
 impl Trees {
-    /// Adds a tree. What is known of its group is in `of`.
+    /// Adds a tree without its lines. What is known of its group is in `of`.
     fn add(&mut self, top: &TopLevel, visible: usize, of: Tree) {
         let before = self.trees.last();
         self.trees.push(Tree {
@@ -33,16 +34,38 @@ impl Trees {
             origin_slack: top.origin_slack,
             ..of
         });
-        self.lines.extend_from_slice(top.nodes().0);
     }
 }
 
 impl World {
-    /// The trees that the file of the scene may hold. Its instances have been placed by the whole
-    /// boxes of objects.
-    pub(crate) fn trees(&self, objects: &Objects) -> Trees {
+    /// Checks that the visible instances of a file can be placed at the first frame of its scene.
+    /// Returns the trees that the file may hold. The boxes of rows are those of whole objects.
+    ///
+    /// # Errors
+    /// The errors of [`Self::new`].
+    pub(crate) fn first_trees(objects: &Objects) -> Result<Trees> {
+        let Some(file) = objects.sole_file() else { return Ok(Trees::default()) };
+        let Some(view) = file.check_scene()? else { return Ok(Trees::default()) };
+        if Groups::of(&view).is_some() || !view.deformers.is_empty() {
+            return Ok(World::new(objects)?.map(|world| world.trees(objects)).unwrap_or_default());
+        }
+        // Placements would take four times the memory of the boxes.
+        let boxes = World::first_boxes(objects, &view)?;
+        let mut trees = Trees::default();
+        if view.tracks.is_empty() && may_be_stored(objects, &view) {
+            let (mut top, visible) = (TopLevel::default(), boxes.len());
+            top.build_over(boxes);
+            let (rows, end_node) = (view.instances.len() as u32, view.nodes.len() as u32);
+            trees.add(&top, visible, Tree { rows, instances: rows, end_node, ..EMPTY });
+            trees.lines = top.into_lines();
+        }
+        Ok(trees)
+    }
+
+    /// The trees of a scene with groups.
+    fn trees(&self, objects: &Objects) -> Trees {
         let (view, mut trees) = (scene_of(objects), Trees::default());
-        if !self.may_be_stored(objects, &view) {
+        if !self.animation.is_empty() || !may_be_stored(objects, &view) {
             return trees;
         }
         let groups = Groups::of(&view);
@@ -69,30 +92,29 @@ impl World {
                 ..EMPTY
             };
             trees.add(&group.top, placed(&group.rows), of);
+            trees.lines.extend_from_slice(group.top.nodes().0);
         }
-        if view.tracks.is_empty() {
-            let all = (0..view.instances.len() as u32).collect::<Vec<_>>();
-            let rows = self.groups().map_or(&*all, |groups| groups.world_rows());
-            let instances = self.instance_count();
+        if let Some(groups) = self.groups().filter(|_| view.tracks.is_empty()) {
+            let (rows, instances) = (groups.world_rows(), self.instance_count());
             let of = Tree { rows: rows.len() as u32, instances, end_node: nodes, ..EMPTY };
             trees.add(&self.top, placed(rows), of);
+            trees.lines.extend_from_slice(self.top.nodes().0);
         }
         trees
     }
+}
 
-    /// Returns true if files may hold trees of the scene.
-    fn may_be_stored(&self, objects: &Objects, view: &SceneView<'_>) -> bool {
-        let mut levels: Vec<u32> = Vec::with_capacity(view.nodes.len());
-        for node in view.nodes {
-            let above = if node.parent == NONE { 0 } else { levels[node.parent as usize] };
-            levels.push(above + 1);
-        }
-        let can_be_hit = |row: &Instance| row.group().is_some() || objects.header(row.object).root != NONE;
-        self.animation.is_empty()
-            && !objects.any_exact()
-            && levels.iter().all(|levels| *levels <= MAX_STORED_LEVELS)
-            && view.instances.iter().all(can_be_hit)
+/// Returns true if files may hold trees of a scene that deforms nothing.
+fn may_be_stored(objects: &Objects, view: &SceneView<'_>) -> bool {
+    let mut levels: Vec<u32> = Vec::with_capacity(view.nodes.len());
+    for node in view.nodes {
+        let above = if node.parent == NONE { 0 } else { levels[node.parent as usize] };
+        levels.push(above + 1);
     }
+    let can_be_hit = |row: &Instance| row.group().is_some() || objects.header(row.object).root != NONE;
+    !objects.any_exact()
+        && levels.iter().all(|levels| *levels <= MAX_STORED_LEVELS)
+        && view.instances.iter().all(can_be_hit)
 }
 
 /// A tree without rows.

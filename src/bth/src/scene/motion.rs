@@ -31,8 +31,7 @@ pub struct InstanceView {
 /// # Errors
 /// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as for [`Scene::set_seconds`].
 pub fn check_first_frame(file: &File) -> Result<Trees, Error> {
-    let objects = Objects::of_file(file.clone());
-    Ok(World::new(&objects)?.map(|world| world.trees(&objects)).unwrap_or_default())
+    World::first_trees(&Objects::of_file(file.clone()))
 }
 
 /// Checks that a time is finite.

@@ -33,7 +33,8 @@ impl Importer<'_, '_> {
             let message = "expected a field of view or height above 0, and znear below zfar";
             return Err(self.file.graph_error(camera_part, message));
         }
-        let given = if camera.name.is_empty() { self.manifest.nodes[node].name.clone() } else { camera.name };
+        let given =
+            if camera.name.is_empty() { self.manifest.nodes.name(node).to_owned() } else { camera.name };
         let name = self.names.cameras.unique(&given, camera_part);
         self.manifest.cameras.push(Camera { name, node, lens, aspect, near: Some(near), far });
         self.manifest.camera = Some(0);

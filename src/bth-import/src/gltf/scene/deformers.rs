@@ -56,15 +56,15 @@ impl Importer<'_, '_> {
         let mut visible = true;
         let mut next = Some(row);
         while let Some(at) = next {
-            let node = &self.manifest.nodes[at];
+            let node = self.manifest.nodes.get(at);
             visible &= node.visible;
             next = node.parent;
         }
-        let name = format!("{}/at rest", self.manifest.nodes[row].name);
+        let name = format!("{}/at rest", self.manifest.nodes.name(row));
         let name = self.names.nodes.unique(&name, String::new());
         let transform = Transform::default();
         self.manifest.nodes.push(Node {
-            name,
+            name: &name,
             parent: None,
             transform,
             object: Some(object),
@@ -181,7 +181,7 @@ impl Importer<'_, '_> {
             let name = self.names.nodes.unique(&node.name, format!("node {index}"));
             let parent = row.replace(self.manifest.nodes.len());
             self.manifest.nodes.push(Node {
-                name,
+                name: &name,
                 parent,
                 transform,
                 object: None,

@@ -73,14 +73,7 @@ impl Importer<'_, '_> {
         let visible = self.file.is_visible(index, node)?;
         let name = self.names.nodes.unique(&node.name, part.clone());
         let transform = self.transform(node, &part)?;
-        self.manifest.nodes.push(Node {
-            name: name.clone(),
-            parent,
-            transform,
-            object: None,
-            group: None,
-            visible,
-        });
+        self.manifest.nodes.push(Node { name: &name, parent, transform, object: None, group: None, visible });
         if let Some(mesh) = node.mesh {
             self.mesh(index, node, mesh, row, &name)?;
         }
@@ -111,13 +104,13 @@ impl Importer<'_, '_> {
             }
             match self.manifest.objects[object].source {
                 bth_scene::Source::AtRest { .. } => self.place_in_world(row, object),
-                _ => self.manifest.nodes[row].object = Some(object),
+                _ => self.manifest.nodes.set_shown(row, Some(object), None),
             }
             return Ok(());
         }
         match instancing {
             Some(value) => self.instancing(&self.file.typed(value, &part)?, row, object, name, &part)?,
-            None => self.manifest.nodes[row].object = Some(object),
+            None => self.manifest.nodes.set_shown(row, Some(object), None),
         }
         Ok(())
     }
@@ -214,7 +207,7 @@ impl Importer<'_, '_> {
             let name = self.names.nodes.unique(&format!("{name}/{i}"), String::new());
             let parent = Some(parent);
             self.manifest.nodes.push(Node {
-                name,
+                name: &name,
                 parent,
                 transform,
                 object: Some(object),

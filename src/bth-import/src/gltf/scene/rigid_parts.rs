@@ -41,7 +41,7 @@ impl Importer<'_, '_> {
         gone.sort_by_key(|deformer| std::cmp::Reverse(deformer.object));
         for Deformer { node, object, .. } in gone {
             self.manifest.tracks.retain(|track| track.node != node || track.property != Property::Weights);
-            self.manifest.nodes[node].object = None;
+            self.manifest.nodes.set_shown(node, None, None);
             self.remove_object(object);
         }
         Ok(())
@@ -80,7 +80,7 @@ impl Importer<'_, '_> {
         let skin = &self.manifest.skins[skin];
         let parent = skin.joints[joint as usize];
         let inverse_bind = skin.inverse_binds.as_ref().map(|all| all[joint as usize]);
-        let joint_name = self.manifest.nodes[parent].name.clone();
+        let joint_name = self.manifest.nodes.name(parent).to_owned();
         let key = GltfPart::Rigid { mesh, joint };
         let object = match self.objects.get(&key) {
             Some(object) => *object,
@@ -92,19 +92,18 @@ impl Importer<'_, '_> {
                 object
             }
         };
-        let name = format!("{}/{joint_name}", self.manifest.nodes[deformer.node].name);
+        let name = format!("{}/{joint_name}", self.manifest.nodes.name(deformer.node));
         let name = self.names.nodes.unique(&name, String::new());
         let visible = self.chain(deformer.node).all(|node| node.visible);
         let transform = inverse_bind.map_or_else(Transform::default, Transform::Matrix);
         let (parent, object) = (Some(parent), Some(object));
-        self.manifest.nodes.push(Node { name, parent, transform, object, group: None, visible });
+        self.manifest.nodes.push(Node { name: &name, parent, transform, object, group: None, visible });
     }
 
     /// A node of the manifest and all above it, upwards.
-    fn chain(&self, row: usize) -> impl Iterator<Item = &Node> {
-        std::iter::successors(Some(&self.manifest.nodes[row]), |node| {
-            Some(&self.manifest.nodes[node.parent?])
-        })
+    fn chain(&self, row: usize) -> impl Iterator<Item = Node<'_>> {
+        let nodes = &self.manifest.nodes;
+        std::iter::successors(Some(nodes.get(row)), |node| Some(nodes.get(node.parent?)))
     }
 
     /// Returns true if an instance can take the place of what a joint moves, at all times: the
@@ -117,7 +116,7 @@ impl Importer<'_, '_> {
             skin.inverse_binds.as_ref().map_or(Some(Bounds::IDENTITY), |all| Bounds::of(&all[joint]));
         let mut next = Some(row);
         while let Some(row) = next {
-            let node = &self.manifest.nodes[row];
+            let node = self.manifest.nodes.get(row);
             bounds = bounds.zip(self.bounds(row)).map(|(a, b)| a.times(&b)).filter(|_| node.visible);
             next = node.parent;
         }
@@ -127,7 +126,7 @@ impl Importer<'_, '_> {
     /// Bounds of the linear part of a node's transform at all times; `None` if it is unbounded.
     fn bounds(&self, row: usize) -> Option<Bounds> {
         let tracks = &self.manifest.tracks;
-        match self.manifest.nodes[row].transform {
+        match self.manifest.nodes.get(row).transform {
             Transform::Matrix(rows) => Bounds::of(&rows),
             Transform::Parts { scale, .. } => {
                 match tracks.iter().find(|t| t.node == row && t.property == Property::Scale) {
@@ -147,10 +146,14 @@ impl Importer<'_, '_> {
     fn remove_object(&mut self, row: usize) {
         let Object { name, .. } = self.manifest.objects.remove(row);
         self.names.objects.remove(&name);
-        let nodes = self.manifest.nodes.iter_mut().filter_map(|node| node.object.as_mut());
+        let nodes = &mut self.manifest.nodes;
+        for node in 0..nodes.len() {
+            if let Some(object) = nodes.object(node).filter(|object| *object > row) {
+                nodes.set_shown(node, Some(object - 1), None);
+            }
+        }
         let deformers = self.manifest.deformers.iter_mut().map(|deformer| &mut deformer.object);
-        for object in nodes.chain(deformers).chain(self.objects.values_mut()).filter(|object| **object > row)
-        {
+        for object in deformers.chain(self.objects.values_mut()).filter(|object| **object > row) {
             *object -= 1;
         }
     }

@@ -21,7 +21,7 @@ impl Importer<'_, '_> {
                 let part = format!("animation {index} channel {number}");
                 let Some(track) = self.track(animation, channel, &part)? else { continue };
                 if !taken.insert((track.node, track.property)) {
-                    let name = &self.manifest.nodes[track.node].name;
+                    let name = self.manifest.nodes.name(track.node);
                     let what = format!("the {} of \"{name}\" is animated already", track.property.name());
                     self.ignore(&part, what)?;
                     continue;
@@ -95,7 +95,7 @@ impl Importer<'_, '_> {
         // Nodes of other scenes have no row.
         let Some(node) = *row else { return Ok(None) };
         let moves = property != Property::Weights;
-        if moves && matches!(self.manifest.nodes[node].transform, Transform::Matrix(_)) {
+        if moves && matches!(self.manifest.nodes.get(node).transform, Transform::Matrix(_)) {
             let message = format!("its node {target} has a matrix, which cannot be animated");
             return Err(self.file.graph_error(part, message));
         }

@@ -3,7 +3,6 @@
 use crate::error::{Result, code};
 use crate::names::Names;
 use crate::table::{Document, Table};
-use std::borrow::Cow;
 use std::ops::Range;
 
 pub(crate) const NODE_KEYS: &[&str] =
@@ -52,20 +51,8 @@ impl<'a> NodeTables<'a> {
         }
     }
 
-    /// Their names. Those in the text are not copied.
-    pub(crate) fn names(&self) -> Result<Names<'a>> {
-        let mut names = Names::new("node");
-        for row in 0..self.len() {
-            self.with(row, |table| {
-                let value = table.need("name")?;
-                let name = value.string()?;
-                let text = match self {
-                    Self::Text(doc, nodes) => value.quoted_in(&doc.text[nodes[row].start as usize..]),
-                    Self::Parsed(_) => None,
-                };
-                names.add(table, text.map_or_else(|| Cow::Owned(name.to_owned()), Cow::Borrowed))
-            })?;
-        }
-        Ok(names)
+    /// Their names.
+    pub(crate) fn names(&self) -> Result<Names> {
+        Names::of("node", self.len(), |row, read| self.with(row, |table| read(table)))
     }
 }

@@ -233,7 +233,7 @@ fn without_joints(table: &Table<'_>) -> Result<JointSet> {
 }
 
 /// Reads a node.
-fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>, into: &mut Nodes) -> Result<()> {
+fn node(table: &Table<'_>, nodes: &Names, objects: &Names, into: &mut Nodes) -> Result<()> {
     table.exclude("object", "group")?;
     into.push(Node {
         name: table.need("name")?.string()?,
@@ -289,7 +289,7 @@ fn check_cycles(tables: &NodeTables<'_>, nodes: &Nodes) -> Result<()> {
     Ok(())
 }
 
-fn camera(table: &Table<'_>, nodes: &Names<'_>) -> Result<Camera> {
+fn camera(table: &Table<'_>, nodes: &Names) -> Result<Camera> {
     table.exclude("fov", "height")?;
     let positive = |key| -> Result<Option<f64>> {
         table.get(key).map(|v| v.number_that("a number above 0", |n| n > 0.0)).transpose()
@@ -319,7 +319,7 @@ fn camera(table: &Table<'_>, nodes: &Names<'_>) -> Result<Camera> {
     })
 }
 
-fn light(table: &Table<'_>, nodes: &Names<'_>) -> Result<Light> {
+fn light(table: &Table<'_>, nodes: &Names) -> Result<Light> {
     #[derive(Clone, Copy, PartialEq)]
     enum Kind {
         Directional,

@@ -12,7 +12,7 @@ pub(crate) const SKIN_KEYS: &[&str] = &["name", "joints", "inverse_binds"];
 pub(crate) const DEFORMER_KEYS: &[&str] = &["node", "object", "skin", "weights"];
 
 /// Reads a skin.
-pub(crate) fn skin(table: &Table<'_>, nodes: &Names<'_>) -> Result<Skin> {
+pub(crate) fn skin(table: &Table<'_>, nodes: &Names) -> Result<Skin> {
     let joints_value = table.need("joints")?;
     let joints = joints_value.array()?.iter().map(|v| nodes.row(v)).collect::<Result<Vec<_>>>()?;
     if joints.is_empty() {
@@ -35,9 +35,9 @@ pub(crate) fn skin(table: &Table<'_>, nodes: &Names<'_>) -> Result<Skin> {
 /// Reads the deformers of a manifest. No two have the same node or the same object.
 pub(crate) fn deformers(
     tables: &[Table<'_>],
-    nodes: &Names<'_>,
-    objects: &Names<'_>,
-    skins: &Names<'_>,
+    nodes: &Names,
+    objects: &Names,
+    skins: &Names,
 ) -> Result<Vec<Deformer>> {
     let (mut seen_nodes, mut seen_objects) = (HashSet::new(), HashSet::new());
     let one = |table: &Table<'_>| {

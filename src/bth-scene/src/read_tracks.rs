@@ -14,7 +14,7 @@ pub(crate) const TRACK_KEYS: &[&str] = &["node", "property", "interpolation", "t
 /// Reads the tracks of a manifest.
 pub(crate) fn tracks(
     tables: &[Table<'_>],
-    names: &Names<'_>,
+    names: &Names,
     nodes: &Nodes,
     deformers: &[Deformer],
 ) -> Result<Vec<Track>> {
@@ -45,7 +45,7 @@ pub(crate) fn tracks(
 }
 
 /// Reads a track; `weights` has for each node with a deformer the number of its weights.
-fn track(table: &Table<'_>, names: &Names<'_>, weights: &HashMap<usize, usize>) -> Result<Track> {
+fn track(table: &Table<'_>, names: &Names, weights: &HashMap<usize, usize>) -> Result<Track> {
     let node_value = table.need("node")?;
     let node = names.row(&node_value)?;
     let property = table.need("property")?.choice(&Property::ALL.map(|p| (p.name(), p)))?;

@@ -170,12 +170,6 @@ impl<'a> Value<'a> {
         self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a string"))
     }
 
-    /// The string as it is quoted in the text in which it was parsed, if it is the same there.
-    pub(crate) fn quoted_in<'t>(&self, text: &'t str) -> Option<&'t str> {
-        let Range { start, end } = self.value.span();
-        text.get(start + 1..end - 1).filter(|quoted| self.value.get_ref().as_str() == Some(quoted))
-    }
-
     pub(crate) fn boolean(&self) -> Result<bool> {
         self.value.get_ref().as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }

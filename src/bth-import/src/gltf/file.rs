@@ -121,10 +121,10 @@ impl<'a> GltfFile<'a> {
     /// rounding, since no affine transform does what they do.
     fn check_transforms(&self) -> Result<()> {
         for (index, node) in self.document.nodes.iter().enumerate() {
-            if node.matrix.is_none() && node.rotation == Some([0.0; 4]) {
+            if node.matrix.is_none() && node.rotation.as_deref() == Some(&[0.0; 4]) {
                 return Err(self.graph_error(format!("node {index}"), "expected a rotation that is not zero"));
             }
-            let Some(columns) = node.matrix else { continue };
+            let Some(columns) = &node.matrix else { continue };
             let row = [3, 7, 11, 15].map(|k| columns[k]);
             let is_affine = row.iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(x, of)| (x - of).abs() <= LAST_ROW);
             if !is_affine {

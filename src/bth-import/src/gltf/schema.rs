@@ -54,7 +54,8 @@ pub(crate) struct GltfScene {
     pub(crate) nodes: Vec<usize>,
 }
 
-/// A node. Numbers are f64 so that world transforms round once, when positions become f32.
+/// A node. Numbers are f64 so that world transforms round once, when positions become f32. There
+/// may be millions, so numbers that most have not are boxed.
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(crate) struct GltfNode {
@@ -64,12 +65,22 @@ pub(crate) struct GltfNode {
     pub(crate) extensions: Extensions,
     pub(crate) mesh: Option<usize>,
     pub(crate) skin: Option<usize>,
-    pub(crate) matrix: Option<[f64; 16]>,
-    pub(crate) translation: Option<[f64; 3]>,
-    pub(crate) rotation: Option<[f64; 4]>,
-    pub(crate) scale: Option<[f64; 3]>,
+    pub(crate) matrix: Option<Box<[f64; 16]>>,
+    pub(crate) translation: Option<Box<[f64; 3]>>,
+    pub(crate) rotation: Option<Box<[f64; 4]>>,
+    pub(crate) scale: Option<Box<[f64; 3]>>,
     /// Weights of the morph targets. They replace the mesh's own.
     pub(crate) weights: Option<Vec<f64>>,
+}
+
+impl GltfNode {
+    /// Translation, rotation and scale, which count where there is no matrix.
+    pub(crate) fn parts(&self) -> ([f64; 3], [f64; 4], [f64; 3]) {
+        let (translation, rotation) = (self.translation.as_deref(), self.rotation.as_deref());
+        let rotation = rotation.copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let scale = self.scale.as_deref().copied().unwrap_or([1.0; 3]);
+        (translation.copied().unwrap_or_default(), rotation, scale)
+    }
 }
 
 /// A skin. Its skeleton root has no bearing on positions and is not read.

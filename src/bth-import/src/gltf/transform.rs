@@ -9,14 +9,15 @@ use crate::gltf::schema::GltfNode;
 /// translates. The quaternion, which is not zero, is normalized as in scenes: the numbers of a file
 /// are rounded, which would shear the mesh, and the error adds up in a long chain of joints.
 pub(super) fn local(node: &GltfNode) -> DAffine3 {
-    match node.matrix {
-        Some(columns) => DAffine3::from_mat4(DMat4::from_cols_array(&columns)),
-        None => DAffine3::from_scale_rotation_translation(
-            DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
-            DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])).normalize(),
-            DVec3::from_array(node.translation.unwrap_or([0.0; 3])),
-        ),
+    if let Some(columns) = &node.matrix {
+        return DAffine3::from_mat4(DMat4::from_cols_array(columns));
     }
+    let (translation, rotation, scale) = node.parts();
+    DAffine3::from_scale_rotation_translation(
+        DVec3::from_array(scale),
+        DQuat::from_array(rotation).normalize(),
+        DVec3::from_array(translation),
+    )
 }
 
 /// The rows of a transform, applied to columns (x, y, z, 1).
@@ -85,9 +86,9 @@ mod tests {
     fn parts_apply_scale_then_rotation_then_translation() {
         let half = 0.5f64.sqrt();
         let turn = local(&GltfNode {
-            translation: Some([10.0, 0.0, 0.0]),
-            rotation: Some([0.0, 0.0, half, half]),
-            scale: Some([2.0, 3.0, 4.0]),
+            translation: Some([10.0, 0.0, 0.0].into()),
+            rotation: Some([0.0, 0.0, half, half].into()),
+            scale: Some([2.0, 3.0, 4.0].into()),
             ..GltfNode::default()
         });
         let p = point(&turn, [1.0, 1.0, 1.0]);
@@ -98,19 +99,19 @@ mod tests {
 
     #[test]
     fn products_apply_the_inner_transform_first() {
-        let scale = local(&GltfNode { scale: Some([2.0; 3]), ..GltfNode::default() });
-        let shift = local(&GltfNode { translation: Some([1.0, 2.0, 3.0]), ..GltfNode::default() });
+        let scale = local(&GltfNode { scale: Some([2.0; 3].into()), ..GltfNode::default() });
+        let shift = local(&GltfNode { translation: Some([1.0, 2.0, 3.0].into()), ..GltfNode::default() });
         assert_eq!(point(&(scale * shift), [1.0; 3]), [4.0, 6.0, 8.0]);
         assert_eq!(point(&(shift * scale), [1.0; 3]), [3.0, 4.0, 5.0]);
         let columns = [2.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 1.0, 2.0, 3.0, 1.0];
-        assert_eq!(local(&GltfNode { matrix: Some(columns), ..GltfNode::default() }), shift * scale);
+        assert_eq!(local(&GltfNode { matrix: Some(columns.into()), ..GltfNode::default() }), shift * scale);
     }
 
     #[test]
     fn normals_stay_perpendicular_and_on_their_side_when_mirrored_and_sheared() {
         let mut columns = [0.0; 16];
         columns[..12].copy_from_slice(&[-2.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.5, 3.0, 0.0]);
-        let t = local(&GltfNode { matrix: Some(columns), ..GltfNode::default() });
+        let t = local(&GltfNode { matrix: Some(columns.into()), ..GltfNode::default() });
         assert!(is_mirrored(&t));
         let n = DVec3::from_array(normal(&t, [0.0, 0.0, 1.0]).map(f64::from));
         let along = |p: DVec3| n.dot(t.transform_vector3(p));

@@ -65,7 +65,7 @@ fn nodes(source: &Source<'_>, scene: &Scene, polygons: Polygons, made: &mut Made
             new.skin = mesh::skin(mesh, node, made);
             if shape.center.is_some() {
                 new.children.push(scene.nodes.count + inner.len());
-                let (name, translation) = (format!("{}/mesh", new.name), shape.center);
+                let (name, translation) = (format!("{}/mesh", new.name), shape.center.map(Box::new));
                 inner.push(GltfNode { name, translation, mesh: number, ..GltfNode::default() });
             } else {
                 new.mesh = number;
@@ -114,9 +114,9 @@ fn place(source: &Source<'_>, node: &Node, is_old: bool) -> Result<GltfNode> {
     Ok(GltfNode {
         name,
         children: node.children.iter().map(|child| child.element.typed_id as usize).collect(),
-        translation: Some([tx, ty, tz]),
-        rotation: Some([rx, ry, rz, rw]),
-        scale: Some([sx, sy, sz]),
+        translation: Some([tx, ty, tz].into()),
+        rotation: Some([rx, ry, rz, rw].into()),
+        scale: Some([sx, sy, sz].into()),
         extensions,
         ..GltfNode::default()
     })

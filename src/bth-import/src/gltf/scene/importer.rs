@@ -7,6 +7,7 @@ use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::scene::{ImportOptions, ImportReport};
 use bth_scene::Manifest;
 use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 
 /// A manifest in the making.
 pub(super) struct Importer<'a, 's> {
@@ -86,7 +87,8 @@ impl<'a, 's> Importer<'a, 's> {
 /// The names of one kind that are taken.
 #[derive(Default)]
 pub(super) struct Names {
-    taken: HashSet<String>,
+    /// Their hashes. A name whose hash another one has counts as taken, too.
+    taken: HashSet<u64>,
     /// Per name that came again, the number to try next; it and all numbers below are taken.
     /// Documents may have thousands of nodes of one name: trying all numbers for each would take
     /// long.
@@ -99,13 +101,13 @@ impl Names {
     pub(super) fn unique(&mut self, given: &str, fallback: String) -> String {
         let base: String = given.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
         let base = if base.is_empty() { fallback } else { base };
-        if self.taken.insert(base.clone()) {
+        if self.taken.insert(hash(&base)) {
             return base;
         }
         let mut number = self.next.get(&base).copied().unwrap_or(2);
         loop {
             let name = format!("{base} {number}");
-            if self.taken.insert(name.clone()) {
+            if self.taken.insert(hash(&name)) {
                 self.next.insert(base, number + 1);
                 return name;
             }
@@ -115,9 +117,14 @@ impl Names {
 
     /// Gives a name free.
     pub(super) fn remove(&mut self, name: &str) {
-        self.taken.remove(name);
+        self.taken.remove(&hash(name));
         self.next.clear();
     }
+}
+
+fn hash(name: &str) -> u64 {
+    // The same in every run, so that names are.
+    BuildHasherDefault::<DefaultHasher>::default().hash_one(name)
 }
 
 #[cfg(test)]

@@ -117,13 +117,12 @@ impl Importer<'_, '_> {
 
     /// A node's transform, checked to be finite.
     pub(super) fn transform(&self, node: &GltfNode, part: &str) -> Result<Transform> {
-        let transform = match node.matrix {
+        let transform = match &node.matrix {
             Some(m) => Transform::Matrix([0, 1, 2].map(|row| [m[row], m[row + 4], m[row + 8], m[row + 12]])),
-            None => Transform::Parts {
-                translation: node.translation.unwrap_or([0.0; 3]),
-                rotation: node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]),
-                scale: node.scale.unwrap_or([1.0; 3]),
-            },
+            None => {
+                let (translation, rotation, scale) = node.parts();
+                Transform::Parts { translation, rotation, scale }
+            }
         };
         let numbers: Vec<f64> = match transform {
             Transform::Matrix(rows) => rows.as_flattened().to_vec(),

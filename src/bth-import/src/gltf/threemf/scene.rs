@@ -32,7 +32,8 @@ pub(super) fn document(source: &Source<'_>, used: Use, _: Polygons) -> Result<Ma
 /// object that is built and for each component in it.
 fn nodes(source: &Source<'_>, model: &Model<'_>, unit: f64) -> Result<Vec<GltfNode>> {
     let axes = [unit, 0., 0., 0., 0., 0., -unit, 0., 0., unit, 0., 0., 0., 0., 0., 1.];
-    let mut nodes = vec![GltfNode { name: "root".to_owned(), matrix: Some(axes), ..GltfNode::default() }];
+    let mut nodes =
+        vec![GltfNode { name: "root".to_owned(), matrix: Some(axes.into()), ..GltfNode::default() }];
     let mut stack: Vec<(usize, &Placed, usize)> = model.items.iter().rev().map(|item| (0, item, 0)).collect();
     while let Some((parent, placed, depth)) = stack.pop() {
         let object = model.objects.get(&placed.key).ok_or_else(|| model.no_object(placed.key))?;
@@ -56,10 +57,11 @@ fn nodes(source: &Source<'_>, model: &Model<'_>, unit: f64) -> Result<Vec<GltfNo
         };
         let name = object.name.clone();
         let mesh = object.mesh.filter(|_| object.center.is_none());
-        let matrix = Some(placed.matrix);
+        let matrix = Some(placed.matrix.into());
         let number = add(parent, GltfNode { name, matrix, mesh, ..GltfNode::default() });
         if let Some(center) = object.center {
-            let (name, translation, mesh) = (format!("{}/mesh", object.name), Some(center), object.mesh);
+            let (name, translation, mesh) =
+                (format!("{}/mesh", object.name), Some(center.into()), object.mesh);
             add(number, GltfNode { name, translation, mesh, ..GltfNode::default() });
         }
         stack.extend(object.components.iter().rev().map(|component| (number, component, depth + 1)));

@@ -10,6 +10,7 @@ IDENTIFIER = bytes.fromhex("89 42 54 48 31 0D 0A 1A 0A 00 00 00 00 00 00 00")
 VERSION = 0x00010000
 FEATURE_GRID = 1
 FEATURE_WIDENED_BOXES = 16
+FEATURE_FIRST_TREES = 32
 
 OBJECT, LINES, TRIANGLE_IDS, TET_LEAVES, TETS, TET_VERTICES, TET_FACES, HULL_FACES, TRIANGLE_FACES = range(1, 10)
 LEAF_VERTICES = 10
@@ -136,7 +137,7 @@ class Container:
         need(h.header_hash == hash128(data[:112]), "F004", "the header was changed", 112)
         need(h.file_length == len(data), "F005", f"{len(data)} bytes instead of {h.file_length}", 24)
         need(h.reserved == 0, "F006", "a reserved field is not zero", 44)
-        known = FEATURE_GRID | FEATURE_WIDENED_BOXES
+        known = FEATURE_GRID | FEATURE_WIDENED_BOXES | FEATURE_FIRST_TREES
         need(h.required_features & ~known == 0, "F007", f"unknown features {h.required_features:#x}", 48)
         end = HEADER.size + ENTRY.size * h.section_count
         fits = h.section_offset == HEADER.size and h.section_count <= 1 << 22 and end <= len(data)

@@ -47,7 +47,9 @@ def check_trees(view):
         shown.append(check_tree(view, tree, number == world, lines[64 * tree.first_line : 64 * line], placed))
         placed.shown.append(shown[-1])
     whole = len(trees) == world + 1 or len(trees) == world and row < len(view.instances)
-    need(whole and 64 * line == len(lines), "F212", f"{len(trees)} trees", c.TREES)
+    first = container.header.required_features & c.FEATURE_FIRST_TREES != 0
+    good = whole != first and len(trees) <= world + 1 and 64 * line == len(lines)
+    need(good, "F212", f"{len(trees)} trees", c.TREES)
     moves = any(t.node < node for t in view.tracks) or view.deformers.deformers
     others = any((i, k) in container.by_key for i in range(container.objects) for k in (c.SEQUENCE_TIMES, c.EXACT_POSITIONS))
     need(not moves and not others, "F212", "trees over what moves", c.TREES)

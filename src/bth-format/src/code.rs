@@ -156,7 +156,7 @@ codes! {
     FreeMet "F209" "Rays that start on a triangle, in a direction of a free bin or its margin, meet no point of a triangle beyond; none within the distance of a level, in a direction of its sector."
     FreeAxes "F210" "A triangle with a row of FREE_DIRECTIONS or FREE_DISTANCES that is not zero has axes: edges from 2^-20 to 2^20 long at its first corner, and a sine of at least 1/128 between them."
     ExactRounding "F211" "A row of POSITIONS next to EXACT_POSITIONS is the f32 nearest to their difference from ANCHOR, with 0 for -0."
-    Trees "F212" "TREES has no rows, or one for each group of nodes and maybe one for the world, which do not move; its rows have the ranges of the groups and together cover TREE_LINES; each visible row of a group, and no other, is in one slot of its tree."
+    Trees "F212" "TREES has no rows, or one for each group of nodes and maybe one for the world, or with required feature bit 5 one for each of the first groups, which do not move; its rows have the ranges of the groups and together cover TREE_LINES; each visible row of a group, and no other, is in one slot of its tree."
     TreeBoxes "F213" "A box of TREE_LINES contains what its child leads to, with the room that rays need; so do the numbers of a row of TREES."
 
     Singular "S001" "The transform of an instance that is seen can be inverted."

@@ -1,5 +1,6 @@
 //! Groups of nodes: which nodes are in which, and in what order groups come.
 
+use crate::model::Track;
 use crate::nodes::Nodes;
 
 /// Max number of nodes with instances on the way to an object, the one of the object included.
@@ -76,9 +77,32 @@ impl NodeGroups {
         self.level[node].is_some()
     }
 
-    /// A key by which nodes are in order: groups behind those that they show, the world last.
-    pub fn order(&self, node: usize) -> (u32, usize) {
+    /// A key by which nodes are in order: groups behind those that they show, those in which
+    /// something moves behind all others, and the world last. `moves` is made by [`Self::moving`].
+    pub fn order(&self, node: usize, moves: &[bool]) -> (bool, u32, usize) {
         let root = self.root[node];
-        self.level[root].map_or((u32::MAX, 0), |level| (level, root))
+        self.level[root].map_or((true, u32::MAX, 0), |level| (moves[root], level, root))
+    }
+
+    /// For the first node of each group if the group moves: a node in it has a track, or shows a
+    /// group that moves.
+    pub fn moving(&self, nodes: &Nodes, tracks: &[Track]) -> Vec<bool> {
+        let mut moves = vec![false; nodes.len()];
+        tracks.iter().for_each(|track| moves[self.root[track.node]] = true);
+        if tracks.is_empty() {
+            return moves;
+        }
+        let shows: Vec<_> = (0..nodes.len()).filter_map(|row| Some((row, nodes.get(row).group?))).collect();
+        // Each round reaches the groups of one more level.
+        let mut is_done = false;
+        while !std::mem::replace(&mut is_done, true) {
+            for (node, shown) in &shows {
+                let moved = moves[*shown];
+                let own = &mut moves[self.root[*node]];
+                is_done &= *own || !moved;
+                *own |= moved;
+            }
+        }
+        moves
     }
 }

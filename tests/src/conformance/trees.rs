@@ -13,8 +13,9 @@ fn still() -> SceneParts {
     SceneParts { tracks: Vec::new(), times: Vec::new(), values: Vec::new(), ..groups() }
 }
 
-/// A file with a scene and the first `trees` trees of the still one.
-fn file(parts: &SceneParts, trees: usize) -> Vec<u8> {
+/// A file with a scene and the first `trees` trees of the still one. `first` is true if the feature
+/// of files with trees of the first groups is noted.
+fn file(parts: &SceneParts, trees: usize, first: bool) -> Vec<u8> {
     let still = still();
     let bytes = builder_of(2, &still).finish();
     let file = bth_format::File::from_bytes(&bytes).expect("a valid file");
@@ -25,19 +26,30 @@ fn file(parts: &SceneParts, trees: usize) -> Vec<u8> {
     let mut builder = builder_of(2, parts);
     builder.rows(kind::TREES, NONE, &all.trees).expect("once");
     builder.rows(kind::TREE_LINES, NONE, &all.lines[..lines]).expect("once");
+    if first {
+        builder.require(FEATURE_FIRST_TREES);
+    }
     builder.finish()
 }
 
+/// The same with a track of a node.
+fn moving(node: u32) -> SceneParts {
+    let parts = SceneParts { nodes: still().nodes, ..groups() };
+    let track = Track { node, ..parts.tracks[0] };
+    SceneParts { tracks: vec![track], ..parts }
+}
+
 pub(super) fn valid() -> Vec<Case> {
-    let moving = SceneParts { nodes: still().nodes, ..groups() };
-    let track = Track { node: 3, ..moving.tracks[0] };
-    let moving = SceneParts { tracks: vec![track], ..moving };
-    vec![Case::new("scene-trees", file(&still(), 3)), Case::new("scene-trees-of-groups", file(&moving, 2))]
+    vec![
+        Case::new("scene-trees", file(&still(), 3, false)),
+        Case::new("scene-trees-of-groups", file(&moving(3), 2, false)),
+        Case::new("scene-trees-of-first-groups", file(&moving(2), 1, true)),
+    ]
 }
 
 pub(super) fn invalid() -> Vec<Case> {
     let changed = |name: &str, kind: u32, at: usize, value: u32| {
-        let mut editor = Editor::new(&file(&still(), 3));
+        let mut editor = Editor::new(&file(&still(), 3, false));
         let start = editor.bytes_at(editor.entry_at(NONE, kind) + offset_of!(SectionEntry, offset));
         editor.put(start + at, value.as_bytes());
         Case::new(name, editor.seal(Seal::Sections))
@@ -60,8 +72,10 @@ pub(super) fn invalid() -> Vec<Case> {
         changed("F212-nodes", kind::TREES, offset_of!(Tree, end_node), 1),
         changed("F212-reserved", kind::TREES, offset_of!(Tree, reserved), 1),
         Case::new("F212-lines-alone", lines_only()),
-        Case::new("F212-trees-missing", file(&still(), 1)),
-        Case::new("F212-moves", file(&groups(), 3)),
+        Case::new("F212-trees-missing", file(&still(), 1, false)),
+        Case::new("F212-feature-not-needed", file(&still(), 3, true)),
+        Case::new("F212-moves", file(&groups(), 3, false)),
+        Case::new("F212-first-group-moves", file(&moving(1), 1, true)),
         changed("F213-box", kind::TREE_LINES, 0, 1e9f32.to_bits()),
         changed("F213-magnitude", kind::TREES, high_of_magnitude, 0),
         changed("F213-condition", kind::TREES, 64 + offset_of!(Tree, condition) + 4, 0x3ff0_0000),

@@ -16,7 +16,7 @@ use crate::write::{self, Content, FileBuilder, SceneParts, SectionHead};
 use bth::Trees;
 use bth_cache::{Key, Record};
 use bth_format::groups::Groups;
-use bth_format::layout::{CacheLine, NODE_LINES, NONE, Node, Tree, kind};
+use bth_format::layout::{CacheLine, FEATURE_FIRST_TREES, NODE_LINES, NONE, Node, Tree, kind};
 use bth_scene::Manifest;
 use std::path::Path;
 use zerocopy::IntoBytes;
@@ -219,8 +219,12 @@ fn build(
         super::images::write(&mut builder, &plan.sources, &objects, context)?;
         builder.provenance(provenance)?;
         builder.move_large(&mut |bytes: &[u8]| context.keeper.keep_bytes(bytes))?;
-        let Trees { trees, lines } = check(&objects, rows, &builder, (report.deformers > 0, name), context)?;
+        let Trees { trees, lines, first_only } =
+            check(&objects, rows, &builder, (report.deformers > 0, name), context)?;
         if lines.len() >= MIN_TREE_LINES {
+            if first_only {
+                builder.require(FEATURE_FIRST_TREES);
+            }
             builder.section(kind::TREES, NONE, size_of::<Tree>() as u32, trees.as_bytes().to_vec())?;
             let mut section = context.keeper.pieces();
             lines.chunks(CHUNK).try_for_each(|lines| section.add(lines.as_bytes()))?;

@@ -9,12 +9,13 @@ use bth_format::layout::NONE;
 use bth_scene::{Lens, LightKind, Manifest, NodeGroups, Track, Transform};
 use std::collections::HashSet;
 
-/// The order of the nodes with parents before children and groups before what shows them: the
-/// manifest's order where it has this property, else by depth.
+/// The order of the nodes with parents before children, groups before what shows them, and groups
+/// that move last: the manifest's order where it has this property, else by depth.
 pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
     let mut order = parents_first(manifest);
     if let Some(groups) = groups(manifest) {
-        order.sort_by_key(|node| groups.order(*node));
+        let moves = groups.moving(&manifest.nodes, &manifest.tracks);
+        order.sort_by_key(|node| groups.order(*node, &moves));
     }
     order
 }

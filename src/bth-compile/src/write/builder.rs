@@ -128,6 +128,11 @@ impl<'a> FileBuilder<'a> {
         content_id(&self.entries())
     }
 
+    /// Notes a feature that a reader needs.
+    pub fn require(&mut self, feature: u64) {
+        self.required_features |= feature;
+    }
+
     /// Checks the number of sections.
     ///
     /// # Errors

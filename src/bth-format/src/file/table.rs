@@ -12,7 +12,7 @@ pub(super) const HEADER_SIZE: usize = size_of::<Header>();
 /// Bytes of a section entry.
 const ENTRY_SIZE: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
-const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_WIDENED_BOXES;
+const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_WIDENED_BOXES | FEATURE_FIRST_TREES;
 
 /// True if hashes are compared. Not under fuzzing: mutated files would have wrong hashes, and no
 /// check behind would be reached.

@@ -31,8 +31,8 @@ pub struct Header {
     pub section_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bits that a reader must know to read the file: [`FEATURE_GRID`] and
-    /// [`FEATURE_WIDENED_BOXES`].
+    /// Bits that a reader must know to read the file: [`FEATURE_GRID`], [`FEATURE_WIDENED_BOXES`] and
+    /// [`FEATURE_FIRST_TREES`].
     pub required_features: u64,
     /// Bits that a reader may ignore; none is assigned.
     pub optional_features: u64,
@@ -87,6 +87,10 @@ pub(crate) const FEATURE_DEFORMABLE_TETS: u64 = 8;
 /// Bit of [`Header::required_features`]: the boxes of an object are widened, see
 /// [`super::WIDENED_BOXES`].
 pub const FEATURE_WIDENED_BOXES: u64 = 16;
+
+/// Bit of [`Header::required_features`]: TREES has trees of the first groups, not of all, or of all
+/// and not of a world without rows.
+pub const FEATURE_FIRST_TREES: u64 = 32;
 
 /// Bit of [`SectionEntry::flags`]: a reader that does not know the section's kind must refuse the
 /// file.

@@ -105,13 +105,13 @@ impl Check<'_> {
             row += u64::from(tree.rows);
             line += u64::from(tree.lines);
         }
-        let is_whole = trees.is_empty()
-            || trees.len() == self.world() + 1
-            || trees.len() == self.world() && (row as usize) < instances.len();
-        if !is_whole || line != tree_lines.len() as u64 {
+        let all_groups = trees.len() == self.world() && (row as usize) < instances.len();
+        let is_whole = trees.is_empty() || trees.len() == self.world() + 1 || all_groups;
+        let is_first = self.file.header().required_features & FEATURE_FIRST_TREES != 0;
+        if is_whole == is_first || trees.len() > self.world() + 1 || line != tree_lines.len() as u64 {
             return wrong(
                 0,
-                "a tree for each group, and lines of these trees",
+                "a tree for each group or, with the feature, each of the first, and lines of these trees",
                 format!("{} trees", trees.len()),
             );
         }

@@ -49,10 +49,25 @@ impl World {
         let mut world = World::unplaced(source, seconds, rows.len(), file.object_count());
         let stored = Arc::new(stored);
         world.stored = Some(Arc::clone(&stored));
-        if stored.groups() > 0 {
-            let within = stored.groups();
-            let place = |instance: &Instance| RowPlace { object: stored.shown(&view, instance), within };
-            let groups = groups::Groups::of_file(&stored, rows.iter().map(place));
+        let (first_node, in_trees) = (stored.nodes(), stored.groups());
+        let moving = Groups::of_rows(view.nodes[first_node as usize..].iter().map(|node| {
+            let parent = (node.parent != NONE).then(|| node.parent.saturating_sub(first_node));
+            (parent, node.flags & NODE_GROUP != 0)
+        }));
+        let count = in_trees + moving.as_ref().map_or(0, Groups::world);
+        if count > 0 {
+            let group_of = |node: u32| match &moving {
+                Some(groups) => in_trees + groups.of_node(node - first_node),
+                None => in_trees,
+            };
+            let place = |instance: &Instance| RowPlace {
+                object: match instance.group() {
+                    Some(node) if node >= first_node => object_of_group(group_of(node)),
+                    _ => stored.shown(&view, instance),
+                },
+                within: group_of(instance.node),
+            };
+            let groups = groups::Groups::of_file(&stored, rows.iter().map(place), count);
             world.set_groups(groups.expect("a file whose scene has been checked"));
         }
         world.top.first_row = stored.rows();

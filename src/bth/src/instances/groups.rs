@@ -148,16 +148,17 @@ impl Groups {
         groups.add(places, count).then_some(groups)
     }
 
-    /// The groups of a file with trees; `places` are the rows that no tree holds. `None` as in
-    /// [`Self::new`].
+    /// The `count` groups of a file with trees; `places` are the rows that no tree holds. `None` as
+    /// in [`Self::new`].
     pub(super) fn of_file(
         stored: &Arc<StoredRows>,
         places: impl Iterator<Item = RowPlace>,
+        count: u32,
     ) -> Option<Groups> {
-        let (trees, count) = (stored.trees(), stored.groups());
         let mut groups = Groups { stored: Some(Arc::clone(stored)), ..Groups::default() };
         groups.groups.resize_with(count as usize + 1, NodeGroup::default);
-        for (group, tree) in groups.groups.iter_mut().zip(trees) {
+        groups.groups.iter_mut().for_each(|group| group.top.first_row = stored.rows());
+        for (group, tree) in groups.groups.iter_mut().zip(stored.trees()) {
             *group = NodeGroup {
                 stored: tree.first_row..tree.first_row.saturating_add(tree.rows),
                 top: TopLevel::stored(stored.file(), tree),

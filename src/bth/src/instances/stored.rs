@@ -8,7 +8,7 @@ use crate::nodes::affine::Affine;
 use crate::nodes::hierarchy::NodeHierarchy;
 use bth_format::SceneView;
 use bth_format::file::File;
-use bth_format::layout::{Instance, Tree};
+use bth_format::layout::{Instance, NODE_GROUP, Tree};
 use std::sync::OnceLock;
 
 /// Rows that are computed together.
@@ -23,9 +23,9 @@ pub(crate) struct StoredRows {
     /// Number of rows, and of the nodes of their groups: the first ones of NODES.
     rows: u32,
     nodes: u32,
-    /// Number of groups; the world has this number.
+    /// Number of groups in trees.
     groups: u32,
-    /// True if the world does not move, either.
+    /// True if nothing moves.
     holds_world: bool,
     /// The rows of groups.
     of_groups: LazyRows<GroupRow>,
@@ -40,7 +40,9 @@ impl StoredRows {
         let last = view.trees.last()?;
         let rows =
             last.first_row.checked_add(last.rows).filter(|rows| *rows as usize <= view.instances.len())?;
-        let holds_world = rows as usize == view.instances.len();
+        // The nodes of a group begin with its first node; the world has no such node.
+        let before = view.trees.len().checked_sub(2).map_or(0, |row| view.trees[row].end_node);
+        let holds_world = view.nodes.get(before as usize).is_none_or(|node| node.flags & NODE_GROUP == 0);
         let groups = (view.trees.len() - usize::from(holds_world)) as u32;
         let has_groups = groups > 0;
         Some(StoredRows {
@@ -74,17 +76,17 @@ impl StoredRows {
         self.nodes
     }
 
-    /// The trees: of each group, and of the world if it is stored, too.
+    /// The trees: of the first groups, and of the world if it is stored, too.
     pub(super) fn trees(&self) -> &[Tree] {
         self.view().trees
     }
 
-    /// Number of groups; the world has this number.
+    /// Number of groups in trees. All before it are such groups.
     pub(super) fn groups(&self) -> u32 {
         self.groups
     }
 
-    /// Returns true if the world does not move, either.
+    /// Returns true if nothing moves.
     pub(super) fn holds_world(&self) -> bool {
         self.holds_world
     }

@@ -10,14 +10,17 @@ use bth_format::groups::Groups;
 use bth_format::layout::{CacheLine, Instance, NONE, Tree};
 use bth_format::limits::MAX_STORED_LEVELS;
 
-/// The trees over the rows of a scene's groups, if no node in them moves, and of its world, if it
-/// does not either. They are what a file may hold. Empty where it may not.
+/// The trees over the rows of a scene's groups before the first that moves, and of its world, if
+/// nothing moves. They are what a file may hold. Empty where it may not.
 #[derive(Debug, Default)]
 pub struct Trees {
     /// Rows of `TREES`.
     pub trees: Vec<Tree>,
     /// Rows of `TREE_LINES`.
     pub lines: Vec<CacheLine>,
+    /// True if a reader of the file needs to know
+    /// [`FEATURE_FIRST_TREES`](bth_format::layout::FEATURE_FIRST_TREES).
+    pub first_only: bool,
 }
 
 impl Trees {
@@ -71,15 +74,18 @@ impl World {
         let groups = Groups::of(&view);
         let (count, nodes) = (groups.as_ref().map_or(0, Groups::world), view.nodes.len() as u32);
         let group_of = |node: u32| groups.as_ref().map_or(0, |groups| groups.of_node(node));
-        // Tracks ascend by node, and groups come before the world.
-        let moves = view.tracks.first().is_some_and(|track| group_of(track.node) < count);
-        if moves || !(0..nodes).is_sorted_by_key(group_of) {
+        if !(0..nodes).is_sorted_by_key(group_of) {
             return trees;
         }
+        // Tracks ascend by node, and groups come before the world. A group only shows groups before
+        // it, so that those before the first with a track do not move.
+        let still = view.tracks.first().map_or(count, |track| group_of(track.node));
         let mut end_node = 0;
         let placed =
             |rows: &[u32]| rows.iter().filter(|row| self.placements[**row as usize].is_some()).count();
-        for (number, group) in (0..count).zip(self.groups().into_iter().flat_map(|groups| groups.each())) {
+        for (number, group) in
+            (0..still.min(count)).zip(self.groups().into_iter().flat_map(|groups| groups.each()))
+        {
             while end_node < nodes && group_of(end_node) == number {
                 end_node += 1;
             }
@@ -94,11 +100,17 @@ impl World {
             trees.add(&group.top, placed(&group.rows), of);
             trees.lines.extend_from_slice(group.top.nodes().0);
         }
-        if let Some(groups) = self.groups().filter(|_| view.tracks.is_empty()) {
-            let (rows, instances) = (groups.world_rows(), self.instance_count());
-            let of = Tree { rows: rows.len() as u32, instances, end_node: nodes, ..EMPTY };
-            trees.add(&self.top, placed(rows), of);
-            trees.lines.extend_from_slice(self.top.nodes().0);
+        match self.groups().filter(|_| view.tracks.is_empty()) {
+            Some(groups) => {
+                let (rows, instances) = (groups.world_rows(), self.instance_count());
+                let of = Tree { rows: rows.len() as u32, instances, end_node: nodes, ..EMPTY };
+                trees.add(&self.top, placed(rows), of);
+                trees.lines.extend_from_slice(self.top.nodes().0);
+            }
+            None => {
+                let rows = trees.trees.last().map_or(0, |last| last.first_row + last.rows);
+                trees.first_only = still < count || rows as usize == view.instances.len();
+            }
         }
         trees
     }

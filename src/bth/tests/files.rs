@@ -29,6 +29,7 @@ const VALID: [(&str, &[u8]); 31] = files![
     "scene-moving",
     "scene-still",
     "scene-trees",
+    "scene-trees-of-first-groups",
     "scene-trees-of-groups",
     "second-uvs",
     "sequence",

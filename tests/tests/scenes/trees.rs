@@ -118,8 +118,25 @@ fn mapped_scenes_with_trees_answer_as_others_at_any_time() {
         values = [[0, 0, 0], [80, 9, -70]]\n[[tracks]]\nnode = \"f2\"\nproperty = \"visible\"\ntimes = [0, 1]\n\
         values = [true, false]\n";
     let flat = format!("{OBJECTS}{}", nodes(4000, ""));
-    let moving = format!("frames = {{ first = 0, last = 9, rate = 9 }}\n{}{tracks}", grouped(4000));
-    for (text, trees) in [(flat, 1), (grouped(4000), 3), (moving, 2)] {
+    let moving =
+        |more: &str| format!("frames = {{ first = 0, last = 9, rate = 9 }}\n{}{more}", grouped(4000));
+    let in_field = tracks.replace("f1", "p1");
+    // A group with a part that moves, and one that shows it: they come behind the others.
+    let birds = "[[nodes]]\nname = \"bird\"\n[[nodes]]\nname = \"wing\"\nobject = \"knot\"\nparent = \"bird\"\n\
+        [[nodes]]\nname = \"flock\"\n[[nodes]]\nname = \"b1\"\ngroup = \"bird\"\nparent = \"flock\"\n\
+        [[nodes]]\nname = \"b2\"\ngroup = \"patch\"\nparent = \"flock\"\ntranslation = [3, 90, 1]\n\
+        [[nodes]]\nname = \"in the world\"\ngroup = \"flock\"\n[[tracks]]\nnode = \"wing\"\n\
+        property = \"translation\"\ntimes = [0, 1]\nvalues = [[0, 0, 0], [80, 9, -70]]\n";
+    let before = birds.replacen("[[nodes]]", "[[nodes]]\nname = \"first\"\ngroup = \"bird\"\n[[nodes]]", 1);
+    let scenes = [
+        (flat, 1),
+        (grouped(4000), 3),
+        (moving(tracks), 2),
+        (moving(&in_field), 1),
+        (moving(birds), 2),
+        (moving(&format!("{before}{tracks}")), 2),
+    ];
+    for (text, trees) in scenes {
         let (mut mapped, mut read, _folder) = opened(&text, &options());
         assert_eq!(has_trees(&mapped), trees);
         let before = mapped.heap_bytes().0;

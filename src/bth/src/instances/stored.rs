@@ -8,7 +8,7 @@ use crate::nodes::affine::Affine;
 use crate::nodes::hierarchy::NodeHierarchy;
 use bth_format::SceneView;
 use bth_format::file::File;
-use bth_format::layout::{Instance, NODE_GROUP, Tree};
+use bth_format::layout::{FEATURE_FIRST_TREES, Instance, Tree};
 use std::sync::OnceLock;
 
 /// Rows that are computed together.
@@ -40,9 +40,8 @@ impl StoredRows {
         let last = view.trees.last()?;
         let rows =
             last.first_row.checked_add(last.rows).filter(|rows| *rows as usize <= view.instances.len())?;
-        // The nodes of a group begin with its first node; the world has no such node.
-        let before = view.trees.len().checked_sub(2).map_or(0, |row| view.trees[row].end_node);
-        let holds_world = view.nodes.get(before as usize).is_none_or(|node| node.flags & NODE_GROUP == 0);
+        let first_only = file.header().required_features & FEATURE_FIRST_TREES != 0;
+        let holds_world = !first_only && rows as usize == view.instances.len();
         let groups = (view.trees.len() - usize::from(holds_world)) as u32;
         let has_groups = groups > 0;
         Some(StoredRows {

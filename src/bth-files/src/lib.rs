@@ -1,7 +1,8 @@
 //! Files as the compiler and its cache use them: content hashes ([`Digest`]), writes that leave a
-//! whole file or none ([`replace`], [`write_once`]), files without a name ([`nameless`], [`mapped`()]), the check
-//! that a path is a regular file ([`regular_file`]), text that terminals may show ([`printable`]),
-//! errors as programs report them ([`Diagnosis`]), and signals that end a program ([`signals`]).
+//! whole file or none ([`replace`], [`write_once`]), files without a name ([`nameless`],
+//! [`mapped`]), the check that a path is a regular file ([`regular_file`]), text that terminals
+//! may show ([`printable`]), errors as programs report them ([`Diagnosis`]), and signals that end
+//! a program ([`signals`]).
 
 mod atomic;
 mod diagnosis;

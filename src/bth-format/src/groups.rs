@@ -29,8 +29,8 @@ impl Groups {
         Groups::of_rows(view.nodes.iter().map(|node| (parent(node), node.flags & NODE_GROUP != 0)))
     }
 
-    /// The groups of nodes, parents first, that are given by their parents and by whether they are
-    /// the first of a group; `None` if there are none.
+    /// The groups of nodes, parents first, each given by its parent and true for the first node of
+    /// a group; `None` without groups.
     pub fn of_rows(nodes: impl Iterator<Item = (Option<u32>, bool)> + Clone) -> Option<Groups> {
         let world = nodes.clone().filter(|(_, is_group)| *is_group).count() as u32;
         if world == 0 {

@@ -29,7 +29,7 @@ pub use error::{Error, Result};
 pub use groups::NodeGroups;
 pub use joint_set::JointSet;
 pub use model::*;
-pub use nodes::{Node, Nodes};
+pub use nodes::{Node, Nodes, Transform};
 pub use read::{parse, read};
 
 /// The keys that are allowed in each table, by the name of the table in the specification.

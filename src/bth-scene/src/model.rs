@@ -2,7 +2,7 @@
 //! of [`Manifest`].
 
 use crate::joint_set::JointSet;
-use crate::nodes::{IDENTITY, Nodes};
+use crate::nodes::Nodes;
 
 /// Version of the manifest format that this crate reads and writes.
 pub const VERSION: i64 = 1;
@@ -191,29 +191,6 @@ impl Source {
                 files.first().map_or("", String::as_str)
             }
         }
-    }
-}
-
-/// From a node's space to its parent's.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Transform {
-    /// Scales, then rotates, then translates. All numbers are finite.
-    Parts {
-        /// Units of the parent.
-        translation: [f64; 3],
-        /// Quaternion x, y, z, w; not zero, normalized when used.
-        rotation: [f64; 4],
-        /// Factor of each axis; an instance with a factor of zero is invisible.
-        scale: [f64; 3],
-    },
-    /// Rows of a matrix that is applied to columns (x, y, z, 1). All finite. Cannot be animated.
-    Matrix([[f64; 4]; 3]),
-}
-
-impl Default for Transform {
-    fn default() -> Self {
-        let (translation, rotation, scale) = IDENTITY;
-        Transform::Parts { translation, rotation, scale }
     }
 }
 

@@ -1,6 +1,5 @@
 //! The nodes of a manifest, in few bytes each: a scene may have many millions.
 
-use crate::model::Transform;
 use std::fmt;
 
 /// A node of the hierarchy.
@@ -21,14 +20,37 @@ pub struct Node<'a> {
     pub visible: bool,
 }
 
+/// From a node's space to its parent's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Transform {
+    /// Scales, then rotates, then translates. All numbers are finite.
+    Parts {
+        /// Units of the parent.
+        translation: [f64; 3],
+        /// Quaternion x, y, z, w; not zero, normalized when used.
+        rotation: [f64; 4],
+        /// Factor of each axis; an instance with a factor of zero is invisible.
+        scale: [f64; 3],
+    },
+    /// Rows of a matrix that is applied to columns (x, y, z, 1). All finite. Cannot be animated.
+    Matrix([[f64; 4]; 3]),
+}
+
+impl Default for Transform {
+    fn default() -> Self {
+        let (translation, rotation, scale) = IDENTITY;
+        Transform::Parts { translation, rotation, scale }
+    }
+}
+
 /// Nodes by number.
 #[derive(Clone, Default, PartialEq)]
 pub struct Nodes {
     rows: Vec<Row>,
     /// All names, one behind the other.
     names: String,
-    /// The numbers of all transforms. Of a translation, rotation or scale that is the identity
-    /// there are none.
+    /// The numbers of all transforms, without translations, rotations and scales that are the
+    /// identity.
     numbers: Vec<f64>,
 }
 
@@ -44,7 +66,7 @@ struct Row {
 }
 
 /// Translation, rotation and scale of the identity.
-pub(crate) const IDENTITY: ([f64; 3], [f64; 4], [f64; 3]) = ([0.0; 3], [0.0, 0.0, 0.0, 1.0], [1.0; 3]);
+const IDENTITY: ([f64; 3], [f64; 4], [f64; 3]) = ([0.0; 3], [0.0, 0.0, 0.0, 1.0], [1.0; 3]);
 const NONE: u32 = u32::MAX;
 const END: u64 = (1 << 48) - 1;
 const VISIBLE: u64 = 1 << 48;

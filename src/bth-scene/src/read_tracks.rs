@@ -1,9 +1,9 @@
 //! Tracks: keyframes of one property of one node.
 
 use crate::error::{Result, code};
-use crate::model::{Deformer, Interpolation, Property, Track, Transform};
+use crate::model::{Deformer, Interpolation, Property, Track};
 use crate::names::Names;
-use crate::nodes::Nodes;
+use crate::nodes::{Nodes, Transform};
 use crate::read_transform::rotation;
 use crate::table::{Table, Value};
 use std::collections::{HashMap, HashSet};

@@ -2,7 +2,7 @@
 //! as a point to look at.
 
 use crate::error::{Result, code};
-use crate::model::Transform;
+use crate::nodes::Transform;
 use crate::table::{Table, Value};
 
 /// Keys of a rotation about an axis.

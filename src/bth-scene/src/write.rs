@@ -1,7 +1,7 @@
 //! Writes a manifest.
 
 use crate::model::*;
-use crate::nodes::Node;
+use crate::nodes::{Node, Transform};
 use std::fmt::Write;
 
 /// Keyframes on a line of a track.

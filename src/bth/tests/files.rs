@@ -11,7 +11,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 31] = files![
+const VALID: [(&str, &[u8]); 32] = files![
     "deformable",
     "deformers",
     "free-directions",

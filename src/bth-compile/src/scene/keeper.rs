@@ -103,7 +103,8 @@ impl Keeper {
         Pieces { keeper: self, bytes: Vec::new(), file: None, written: 0, hasher: blake3::Hasher::new() }
     }
 
-    /// The file of a builder, which need not stay in memory. Its header and table have been checked.
+    /// The file of a builder, which need not stay in memory. Its header and table have been
+    /// checked.
     ///
     /// # Errors
     /// The errors of [`assembled`]; `BTH-O020` when it cannot be written to disk.

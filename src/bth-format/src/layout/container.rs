@@ -31,8 +31,8 @@ pub struct Header {
     pub section_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bits that a reader must know to read the file: [`FEATURE_GRID`], [`FEATURE_WIDENED_BOXES`] and
-    /// [`FEATURE_FIRST_TREES`].
+    /// Bits that a reader must know to read the file: [`FEATURE_GRID`], [`FEATURE_WIDENED_BOXES`]
+    /// and [`FEATURE_FIRST_TREES`].
     pub required_features: u64,
     /// Bits that a reader may ignore; none is assigned.
     pub optional_features: u64,

@@ -42,7 +42,8 @@ impl Trees {
 
 impl World {
     /// Checks that the visible instances of a file can be placed at the first frame of its scene.
-    /// Returns the trees that the file may hold. The boxes of rows are those of whole objects.
+    /// Returns the trees that the file may hold. Rows have the boxes of whole
+    /// objects.
     ///
     /// # Errors
     /// The errors of [`Self::new`].
@@ -78,7 +79,7 @@ impl World {
             return trees;
         }
         // Tracks ascend by node, and groups come before the world. A group only shows groups before
-        // it, so that those before the first with a track do not move.
+        // it, so that no group before the first with a track moves.
         let still = view.tracks.first().map_or(count, |track| group_of(track.node));
         let mut end_node = 0;
         let placed =

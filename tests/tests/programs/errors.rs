@@ -61,7 +61,6 @@ fn missing_files_exit_4() {
         &["info", "missing.bth"],
         &["verify", "missing.bth"],
         &["trace", "missing.bth", "missing.rays", "-o", "x.hits"],
-        &["explain", "missing.obj"],
         &["marks", "missing.obj"],
     ] {
         let run = bthc(folder.path(), args).expect(4);
@@ -217,7 +216,6 @@ fn pipes_and_devices_are_refused_where_files_are_read_whole() {
         &["bthc", "compile", "p.glb"],
         &["bthc", "compile", "p.manifest"],
         &["bthc", "import", "p.glb", "-o", "a.manifest"],
-        &["bthc", "explain", "p.obj"],
         &["bthc", "marks", "p.obj"],
         &["bthc", "compile", "ball.obj", "--rays", "p"],
         &["bth-play", "ball.bth", "-o", "a.png", "--mode", "path", "--env", "/dev/zero"],

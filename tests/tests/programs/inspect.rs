@@ -163,17 +163,6 @@ fn marks_lists_crossing_triangles() {
 }
 
 #[test]
-fn explain_tells_why_nodes_were_chosen_or_refused() {
-    let folder = folder(&[("ball.obj", &sphere(32)), ("crossing.obj", &crossing())]);
-    let json = bthc(folder.path(), &["explain", "ball.obj", "--json"]).expect(0).json();
-    let first = &json["nodes"][0];
-    assert_eq!((&first["node"], &first["count"]), (&0.into(), &(4 * 32 * 31).into()), "{json:#}");
-    assert!(first["decision"].is_string() || first["decision"].is_object(), "{json:#}");
-    let text = bthc(folder.path(), &["explain", "crossing.obj"]).expect(0).stdout;
-    assert!(text.contains("triangles"), "{text}");
-}
-
-#[test]
 fn info_lists_groups_and_materials() {
     let faces: String = (0..45).map(|i| format!("g part {i}\nf 1 2 3\n")).collect();
     let model =

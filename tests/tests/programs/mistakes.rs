@@ -28,7 +28,7 @@ const BTHC: [Mistake; 22] = [
     ("bthc", &["compile", "ball.obj", "--cache-dir", "ball.obj"], 4, &["ball.obj", "BTH-O063"]),
     ("bthc", &["info", "empty"], 4, &["empty", "BTH-O001", "a folder, not a file"]),
     ("bthc", &["info", "words.manifest"], 3, &["words.manifest", "BTH-I001", "a scene manifest"]),
-    ("bthc", &["explain", "ball.bth"], 3, &["ball.bth", "BTH-I001", "a compiled file", "bthc info"]),
+    ("bthc", &["marks", "ball.bth"], 3, &["ball.bth", "BTH-I001", "a compiled file", "bthc info"]),
     ("bthc", &["marks", "words.manifest"], 3, &["words.manifest", "BTH-I001", "a scene manifest"]),
     ("bthc", &["compile", "ball.bth", "-o", "x.bth"], 3, &["ball.bth", "BTH-I001", "a compiled file"]),
     ("bthc", &["verify", "missing.bth"], 4, &["missing.bth", "BTH-O001"]),

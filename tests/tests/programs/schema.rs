@@ -96,5 +96,5 @@ fn what_the_schema_does_not_list_is_found() {
     assert!(path(json!({"more": 1})).is_some() && path(json!({"path": 1})).is_some());
     let failed = json!({"jobs": [{"model": "a", "error": {"code": 5}}]});
     assert!(wrong("compile", &failed).is_some_and(|wrong| wrong.contains("code")));
-    assert!(wrong("compile", &json!({})).is_some() && wrong("explain", &json!({})).is_none());
+    assert!(wrong("compile", &json!({})).is_some() && wrong("marks", &json!({})).is_none());
 }

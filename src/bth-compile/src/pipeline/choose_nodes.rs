@@ -1,7 +1,7 @@
 //! Choice of the nodes to tetrahedralize, by structure: none, those with a gain, or the root.
 
 use super::traced::TracedMesh;
-use crate::costs::{self, Choice, CostReport};
+use crate::costs::{self, CostReport};
 use crate::error::{Error, Place, Result};
 use crate::marks::{self, Marks};
 use crate::monitor::Monitor;
@@ -20,7 +20,7 @@ pub(super) struct ChooseNodes<'a> {
 }
 
 impl Stage for ChooseNodes<'_> {
-    type Output = Option<(Choice, Option<CostReport>)>;
+    type Output = Option<(Vec<u32>, Option<CostReport>)>;
     const NAME: &'static str = "costs";
     const VERSION: &'static str = "5";
 
@@ -29,22 +29,22 @@ impl Stage for ChooseNodes<'_> {
         let (mesh, tree) = (&traced.mesh, &traced.tree);
         let found = match (options.structure, marks) {
             (Structure::Bth, Some(marks)) => {
-                let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, monitor)?;
-                Some((choice, Some(report)))
+                let (chosen, report) = costs::choose(mesh, tree, marks, &options.costs, monitor)?;
+                Some((chosen, Some(report)))
             }
             (Structure::Bth, None) if options.costs.more_suitable_gain_more() => {
-                let (choice, report) = costs::choose_of_all(mesh, tree, &options.costs, monitor)?;
-                choice.chosen.is_empty().then_some((choice, Some(report)))
+                let (chosen, report) = costs::choose_of_all(mesh, tree, &options.costs, monitor)?;
+                chosen.is_empty().then_some((chosen, Some(report)))
             }
             (Structure::Tets, Some(marks)) => match marks.suitable.first() {
-                Some(true) => Some((Choice { chosen: vec![0], verdicts: Vec::new() }, None)),
+                Some(true) => Some((vec![0], None)),
                 Some(false) => {
                     return Err(bad_contacts(source, &marks::bad_pairs(mesh, tree, monitor)?, mesh));
                 }
-                None => Some((Choice::default(), None)),
+                None => Some((Vec::new(), None)),
             },
             (Structure::Bth | Structure::Tets, None) => None,
-            (Structure::Bvh, _) => Some((Choice::default(), None)),
+            (Structure::Bvh, _) => Some((Vec::new(), None)),
         };
         Ok(found)
     }

@@ -193,8 +193,8 @@ impl<'a> Compiler<'a> {
                 self.run(ChooseNodes { source, traced, marks: Some(&marks), options })?
             }
         };
-        let (choice, costs) = chosen.unwrap_or_default();
-        let chosen = &choice.chosen[..];
+        let (chosen, costs) = chosen.unwrap_or_default();
+        let chosen = &chosen[..];
         let (built, report) = self.run(Tetrahedralize { source, mesh, tree, chosen, options, cache })?;
         (reports.costs, reports.tets) = (costs, Some(report));
         let (leaves, probe) = self.run(Probe { mesh, tree, built, options })?;

@@ -1,14 +1,13 @@
 //! The selection of max gain over all suitable nodes, none below another, by dynamic programming
 //! from the leaves up.
 
-use super::gains::Gain;
 use bth_bvh::BinaryBvh;
 
 /// Candidate nodes in ascending order, with the gain of each.
 pub(super) struct Candidates<'a> {
     pub(super) bvh: &'a BinaryBvh,
     pub(super) nodes: &'a [u32],
-    pub(super) gains: &'a [Gain],
+    pub(super) gains: &'a [f64],
 }
 
 impl Candidates<'_> {
@@ -26,7 +25,7 @@ impl Candidates<'_> {
         let mut best = vec![0.0; count + 1];
         let mut taken = vec![false; count];
         for k in (0..count).rev() {
-            let gain = self.gains[k].saved;
+            let gain = self.gains[k];
             let with = gain + best[self.end(k)];
             taken[k] = gain > 0.0 && with > best[k + 1];
             best[k] = if taken[k] { with } else { best[k + 1] };
@@ -59,7 +58,7 @@ mod tests {
                     continue 'sets;
                 }
             }
-            best = best.max(rows.iter().map(|&k| c.gains[k].saved).sum());
+            best = best.max(rows.iter().map(|&k| c.gains[k]).sum());
         }
         best
     }
@@ -70,9 +69,9 @@ mod tests {
         fn no_selection_gains_more(seed in any::<u64>(), saved in prop::collection::vec(-1.0..1.0f64, 11)) {
             let bvh = tree(seed, 40);
             let nodes: Vec<u32> = (0..bvh.nodes.len() as u32).filter(|i| bvh.nodes[*i as usize].count > 3).take(11).collect();
-            let gains: Vec<Gain> = (0..nodes.len()).map(|k| Gain { saved: saved[k], ..Gain::default() }).collect();
-            let c = Candidates { bvh: &bvh, nodes: &nodes, gains: &gains };
-            let gain: f64 = c.best().iter().map(|&k| gains[k].saved).sum();
+            let gains = &saved[..nodes.len()];
+            let c = Candidates { bvh: &bvh, nodes: &nodes, gains };
+            let gain: f64 = c.best().iter().map(|&k| gains[k]).sum();
             prop_assert!((gain - by_trying(&c)).abs() < 1e-9);
         }
     }

@@ -1,8 +1,8 @@
 //! The selection: the nodes of min expected time.
 
 use super::bottom_up::Candidates;
-use super::gains::{Gain, Sampled, sample};
-use super::options::{Choice, CostOptions, CostReport, Select, SelectionOutcome, Verdict};
+use super::gains::{Sampled, sample};
+use super::options::{CostOptions, CostReport, Select};
 use super::prices::Prices;
 use crate::marks::Marks;
 use bth_bvh::BinaryBvh;
@@ -11,7 +11,7 @@ use bth_import::Mesh;
 use bth_import::error::{Error, Result};
 use bth_import::monitor::Monitor;
 
-/// Chooses nodes to tetrahedralize.
+/// Chooses nodes to tetrahedralize, ascending; none lies below another.
 ///
 /// # Errors
 /// [`Error::Cancelled`]; `BTH-X030` when `marks` belongs to another BVH.
@@ -21,37 +21,25 @@ pub fn choose(
     marks: &Marks,
     options: &CostOptions,
     monitor: &dyn Monitor,
-) -> Result<(Choice, CostReport)> {
+) -> Result<(Vec<u32>, CostReport)> {
     monitor.stage("costs", None);
     if marks.suitable.len() != bvh.nodes.len() {
         let message = format!("{} marks for {} nodes", marks.suitable.len(), bvh.nodes.len());
         return Err(Error::Internal { code: "BTH-X030", message });
     }
-    let prices = Prices::new(options);
-    let (mut choice, cost_bvh, mut cost_with_tets) = match &options.select {
-        Select::Best => best(mesh, bvh, marks, options, &prices, monitor)?,
-        Select::Nodes(nodes) => (Choice { chosen: nodes.clone(), verdicts: Vec::new() }, 0.0, 0.0),
+    let mut report = CostReport { options: options.clone(), ..CostReport::default() };
+    let mut chosen = match &options.select {
+        Select::Best => best(mesh, bvh, marks, &mut report, monitor)?,
+        Select::Nodes(nodes) => nodes.clone(),
     };
-    if !choice.chosen.is_empty() && cost_bvh - cost_with_tets < options.minimum_gain * cost_bvh {
-        for verdict in choice.verdicts.iter_mut().filter(|v| v.decision == SelectionOutcome::Chosen) {
-            verdict.decision = SelectionOutcome::RefusedGain;
-        }
-        choice.chosen.clear();
-        cost_with_tets = cost_bvh;
+    if report.cost_bvh - report.cost_with_tets < options.minimum_gain * report.cost_bvh {
+        chosen.clear();
+        report.cost_with_tets = report.cost_bvh;
     }
-    let triangles: u64 = choice.chosen.iter().map(|&i| u64::from(bvh.nodes[i as usize].count)).sum();
-    let refused = |v: &&Verdict| v.decision == SelectionOutcome::RefusedCost;
-    let report = CostReport {
-        options: options.clone(),
-        examined: choice.verdicts.len() as u64,
-        chosen: choice.chosen.len() as u64,
-        triangles,
-        share: triangles as f64 / bvh.order.len().max(1) as f64,
-        refused_for_cost: choice.verdicts.iter().filter(refused).count() as u64,
-        cost_bvh,
-        cost_with_tets,
-    };
-    Ok((choice, report))
+    report.chosen = chosen.len() as u64;
+    report.triangles = chosen.iter().map(|&i| u64::from(bvh.nodes[i as usize].count)).sum();
+    report.share = report.triangles as f64 / bvh.order.len().max(1) as f64;
+    Ok((chosen, report))
 }
 
 /// Chooses as if all nodes were suitable. If no node is chosen then, none is whatever the marks,
@@ -64,20 +52,21 @@ pub fn choose_of_all(
     bvh: &BinaryBvh,
     options: &CostOptions,
     monitor: &dyn Monitor,
-) -> Result<(Choice, CostReport)> {
+) -> Result<(Vec<u32>, CostReport)> {
     let all = Marks { suitable: vec![true; bvh.nodes.len()] };
     choose(mesh, bvh, &all, options, monitor)
 }
 
-/// The choice of max gain, with the cost of a ray before and after.
+/// The choice of max gain. Notes in the report what was examined, and the cost of a ray before and
+/// after.
 fn best(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     marks: &Marks,
-    options: &CostOptions,
-    prices: &Prices<'_>,
+    report: &mut CostReport,
     monitor: &dyn Monitor,
-) -> Result<(Choice, f64, f64)> {
+) -> Result<Vec<u32>> {
+    let options = &report.options;
     let top = nodes_from(bvh, options.minimum_triangles);
     monitor.check()?;
     let fits = |i: &u32| {
@@ -88,34 +77,32 @@ fn best(
     let nodes: Vec<u32> = top.iter().copied().filter(fits).collect();
     if nodes.is_empty() {
         // Without candidates no rays need to be traced.
-        let verdicts = top.iter().map(|&i| verdict(bvh, marks, options, i, None)).collect();
-        return Ok((Choice { chosen: Vec::new(), verdicts }, 0.0, 0.0));
+        report.examined = top.len() as u64;
+        return Ok(Vec::new());
     }
     let weights = options.rays.as_deref().map_or(options.optimize_for.weights(), KnownRays::shares);
     let sampled: Sampled = sample(mesh, bvh, options);
     monitor.check()?;
-    let gains = sampled.gains(bvh, &nodes, prices, weights);
+    let gains = sampled.gains(bvh, &nodes, &Prices::new(options), weights);
     let rows = Candidates { bvh, nodes: &nodes, gains: &gains }.best();
     let chosen: Vec<u32> = rows.iter().map(|&k| nodes[k]).collect();
-    let saved: f64 = rows.iter().map(|&k| gains[k].saved).sum();
+    let saved: f64 = rows.iter().map(|&k| gains[k]).sum();
+    (report.cost_bvh, report.cost_with_tets) = (sampled.cost_bvh, sampled.cost_bvh - saved);
 
-    let mut verdicts: Vec<Verdict> = Vec::with_capacity(top.len());
+    // Nodes below a chosen or a small node are not examined.
     let mut skip_to = 0;
     for &i in top.iter() {
         if i < skip_to {
             continue;
         }
-        let row = nodes.binary_search(&i).ok();
-        let mut v = verdict(bvh, marks, options, i, row.map(|k| &gains[k]));
+        report.examined += 1;
         if chosen.binary_search(&i).is_ok() {
-            v.decision = SelectionOutcome::Chosen;
-            skip_to = i + 2 * v.count - 1;
-        } else if row.is_some() && v.gain > 0.0 {
-            v.decision = SelectionOutcome::RefusedParts;
+            skip_to = i + 2 * bvh.nodes[i as usize].count - 1;
+        } else if nodes.binary_search(&i).is_ok_and(|k| gains[k] <= 0.0) {
+            report.refused_for_cost += 1;
         }
-        verdicts.push(v);
     }
-    Ok((Choice { chosen, verdicts }, sampled.cost_bvh, sampled.cost_bvh - saved))
+    Ok(chosen)
 }
 
 /// The nodes of at least this many triangles and their smaller children, ascending.
@@ -127,18 +114,4 @@ fn nodes_from(bvh: &BinaryBvh, triangles: u32) -> Vec<u32> {
         i += if count < triangles { 2 * count as usize - 1 } else { 1 };
     }
     nodes
-}
-
-fn verdict(bvh: &BinaryBvh, marks: &Marks, options: &CostOptions, i: u32, gain: Option<&Gain>) -> Verdict {
-    let count = bvh.nodes[i as usize].count;
-    let suitable = marks.suitable[i as usize];
-    let decision = match () {
-        _ if count < options.minimum_triangles => SelectionOutcome::RefusedSmall,
-        _ if !suitable => SelectionOutcome::Unsuitable,
-        _ if count > options.maximum_triangles => SelectionOutcome::RefusedLarge,
-        _ => SelectionOutcome::RefusedCost,
-    };
-    let gain = gain.copied().unwrap_or_default();
-    let Gain { saved, tets, bvh, steps } = gain;
-    Verdict { node: i, count, suitable, cost_tet: tets, cost_bvh: bvh, n_avg: steps, gain: saved, decision }
 }

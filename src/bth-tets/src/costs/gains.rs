@@ -22,19 +22,6 @@ const SHORT_STEPS: f64 = 0.6;
 const TRIANGLES_PER_RAY: usize = 16;
 const RAYS_OF_KIND: [usize; 2] = [512, 4096];
 
-/// Estimated gain of a node.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Gain {
-    /// Nanoseconds saved for each ray of the model; below 0 where tetrahedra are the slower.
-    pub(super) saved: f64,
-    /// Nanoseconds of a ray that may use the tetrahedra: through the tetrahedra, and through the
-    /// BVH.
-    pub(super) tets: f64,
-    pub(super) bvh: f64,
-    /// Estimated steps.
-    pub(super) steps: f64,
-}
-
 /// The sample rays, traced through the BVH.
 pub(super) struct Sampled {
     /// Rays from surfaces, with the row that each starts on and its result.
@@ -103,20 +90,20 @@ impl Sampled {
         before(nodes.end) - before(nodes.start)
     }
 
-    /// The gains of these nodes, which are ascending. `weights` are the weights of rays from
-    /// outside and from surfaces.
+    /// Nanoseconds that tetrahedra in these nodes, which are ascending, save for each ray of the
+    /// model; below 0 where they are the slower. `weights` are the weights of rays from outside and
+    /// from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,
         nodes: &[u32],
         prices: &Prices<'_>,
         weights: [f64; 2],
-    ) -> Vec<Gain> {
+    ) -> Vec<f64> {
         let costs = prices.bvh();
-        let mut gains: Vec<Gain> = Vec::with_capacity(nodes.len());
-        let mut started = vec![0u32; nodes.len()];
         let steps = |start: Start, k: usize| steps(start, bvh.nodes[nodes[k] as usize].count);
-        gains.resize(nodes.len(), Gain::default());
+        // Of the rays that start on each node: through its tetrahedra, and through the BVH.
+        let mut times = vec![[0.0; 2]; nodes.len()];
         for (ray, row, traced) in &self.surface {
             let bvh_time = costs.ray + costs.surface * f64::from(traced.visits);
             for at in path(bvh, *row) {
@@ -128,15 +115,12 @@ impl Sampled {
                 if at != 0 && leaves(ray, traced, node) {
                     time += bvh_time;
                 }
-                started[k] += 1;
-                gains[k].tets += time;
-                gains[k].bvh += bvh_time;
+                times[k][0] += time;
+                times[k][1] += bvh_time;
             }
         }
-        for (k, ((gain, &at), &started)) in gains.iter_mut().zip(nodes).zip(&started).enumerate() {
+        let gain = |(k, (&at, [tets, plain])): (usize, (&u32, [f64; 2]))| {
             let node = &bvh.nodes[at as usize];
-            gain.steps = steps(Start::Surface, k);
-            gain.saved += weights[1] * (gain.bvh - gain.tets) / self.surface.len().max(1) as f64;
             let n = steps(Start::Outside, k);
             let walked = match at {
                 0 => prices.outside(node.count, n, LINES_THAT_HIT),
@@ -146,11 +130,10 @@ impl Sampled {
             let prepared = if at == 0 { costs.ray } else { 0.0 };
             let through = costs.outside * self.entered(at..at + 2 * node.count - 1) as f64
                 + (prepared - walked) * self.entered(at..at + 1) as f64;
-            gain.saved += weights[0] * through / self.outside.max(1) as f64;
-            let started = f64::from(started.max(1));
-            (gain.tets, gain.bvh) = (gain.tets / started, gain.bvh / started);
-        }
-        gains
+            weights[1] * (plain - tets) / self.surface.len().max(1) as f64
+                + weights[0] * through / self.outside.max(1) as f64
+        };
+        nodes.iter().zip(times).enumerate().map(gain).collect()
     }
 }
 

@@ -22,7 +22,7 @@ mod tests;
 
 pub use choose::{choose, choose_of_all};
 pub use estimate::{Estimator, Start};
-pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, SelectionOutcome, Verdict};
+pub use options::{CostOptions, CostReport, OptimizeFor, Probe, Select};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
 pub use tet_walk::{TetWalker, Walked};

@@ -1,4 +1,4 @@
-//! Options of the selection, and the verdict on each node.
+//! Options of the selection, and its report.
 
 use super::{Estimator, Profile};
 use bth_bvh::sampling::KnownRays;
@@ -117,72 +117,6 @@ impl Default for CostOptions {
             rays: None,
         }
     }
-}
-
-/// The reason for which a node was or was not chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SelectionOutcome {
-    /// It becomes a tet leaf.
-    Chosen,
-    /// Its BVH is estimated to cost less.
-    RefusedCost,
-    /// Nodes below it save more.
-    RefusedParts,
-    /// It has fewer triangles than the minimum.
-    RefusedSmall,
-    /// It has more triangles than the maximum.
-    RefusedLarge,
-    /// It would be chosen, but all such nodes together save less than the min gain.
-    RefusedGain,
-    /// Some of its triangles are in bad contact.
-    Unsuitable,
-}
-
-impl std::fmt::Display for SelectionOutcome {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            SelectionOutcome::Chosen => "chosen",
-            SelectionOutcome::RefusedCost => "no: the BVH costs less",
-            SelectionOutcome::RefusedParts => "no: its parts save more",
-            SelectionOutcome::RefusedSmall => "no: too few triangles",
-            SelectionOutcome::RefusedLarge => "no: too many triangles",
-            SelectionOutcome::RefusedGain => "no: too little gained on the whole",
-            SelectionOutcome::Unsuitable => "no: bad contacts",
-        })
-    }
-}
-
-/// The costs of one node, and the decision on it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Verdict {
-    /// Index in the binary BVH.
-    pub node: u32,
-    /// Triangles below it.
-    pub count: u32,
-    /// True if these triangles are free of bad contacts.
-    pub suitable: bool,
-    /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that starts on
-    /// one of its triangles.
-    pub cost_tet: f64,
-    /// Estimated cost of the same ray with the node's BVH.
-    pub cost_bvh: f64,
-    /// Estimated steps of a ray through its tetrahedralization.
-    pub n_avg: f64,
-    /// Saving by the tetrahedra, nanoseconds for each ray of the model.
-    pub gain: f64,
-    /// The decision.
-    pub decision: SelectionOutcome,
-}
-
-/// The selection.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Choice {
-    /// Nodes that become tet leaves, ascending; none lies below another.
-    pub chosen: Vec<u32>,
-    /// The nodes that were examined, ascending; nodes below a chosen or a small node are not
-    /// examined.
-    pub verdicts: Vec<Verdict>,
 }
 
 /// Report of the selection.

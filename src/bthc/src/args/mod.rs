@@ -11,7 +11,6 @@ mod selection;
 pub(crate) use cache::*;
 pub(crate) use compile::*;
 pub(crate) use gltf::Gltf;
-pub(crate) use selection::Selection;
 
 use clap::{Args as Group, Parser, Subcommand};
 use common::{EXIT_CODES, output_file, threads};
@@ -46,7 +45,6 @@ pub(crate) enum Command {
     Import(Import),
     Info(Info),
     Verify(Verify),
-    Explain(Explain),
     Marks(Marks),
     Positions(Positions),
     Trace(Trace),
@@ -117,24 +115,6 @@ pub(crate) struct Diff {
     pub(crate) first: PathBuf,
     /// Another one.
     pub(crate) second: PathBuf,
-    /// Print one JSON object.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-/// Show which nodes of a model would be tetrahedralized, which not, and why, with the costs.
-#[derive(Debug, Group)]
-pub(crate) struct Explain {
-    /// The model.
-    pub(crate) model: PathBuf,
-    #[command(flatten)]
-    pub(crate) selection: Selection,
-    /// Nodes to show, largest first; 0 for all.
-    #[arg(long, default_value_t = 20, value_name = "N")]
-    pub(crate) top: usize,
-    /// Threads; 0 for one per processor.
-    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
-    pub(crate) threads: usize,
     /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,

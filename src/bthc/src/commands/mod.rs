@@ -7,7 +7,6 @@ mod deliver;
 mod depfile;
 mod diff;
 mod dry_run;
-mod explain;
 mod holes;
 mod import;
 mod info;
@@ -37,7 +36,6 @@ pub(crate) fn run(command: Command, wants_json: bool) -> Result<(), Failure> {
         Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
-        Command::Explain(args) => explain::run(&args),
         Command::Marks(args) => marks::run(&args),
         Command::Positions(args) => positions::run(&args),
         Command::Trace(args) => trace::run(&args),

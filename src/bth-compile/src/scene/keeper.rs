@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Bytes of objects that are kept in memory.
 const MEMORY: u64 = 64 << 20;
 /// Bytes of a section that are collected before they go to disk.
-const IN_PIECES: usize = 16 << 20;
+const IN_PIECES: u64 = 16 << 20;
 /// Bytes of a file without a name. A scene may need many of them: each is gone when the last of its
 /// sections has been written.
 const SPOOL: u64 = 1 << 30;
@@ -184,7 +184,7 @@ impl Pieces<'_> {
     pub(super) fn add(&mut self, piece: &[u8]) -> Result<()> {
         self.hasher.update(piece);
         self.bytes.extend_from_slice(piece);
-        if self.bytes.len() < IN_PIECES {
+        if (self.bytes.len() as u64) < IN_PIECES.min(self.keeper.memory) {
             return Ok(());
         }
         if let (None, Some(folder)) = (&self.file, &self.keeper.folder) {

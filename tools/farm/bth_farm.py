@@ -98,13 +98,16 @@ def run_here(name, arguments, environment):
 
 
 def compile_models(client, models, output, options, environment, count, on_done=lambda done: None):
-    """Compiles models, or the objects of a scene, on all workers, then puts the files together here; the JSON of that."""
+    """Compiles models, or the objects of a scene and their parts, on all workers, then puts the files together here; the JSON
+    of that."""
     models = [str(Path(model).resolve()) for model in models]
     parts = [("bthc", ["compile", *models, "--in-cache", "--shard", shard, *options]) for shard in shards(count)]
     objects = run_parts(client, parts, environment, on_done)
     done = run_here("bthc", ["compile", *models, "-o", str(output), *options], environment)
+    jobs = [job for part in objects for job in part["jobs"]]
     # A model is one object, and the part that compiles it reports no number of objects.
-    done["farm"] = {"parts": count, "objects": sum(job.get("objects", 1) for part in objects for job in part["jobs"])}
+    built = {"objects": sum(job.get("objects", 1) for job in jobs), "object_parts": sum(job.get("parts", 0) for job in jobs)}
+    done["farm"] = {"parts": count, **built}
     return done
 
 

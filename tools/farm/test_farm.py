@@ -87,6 +87,8 @@ def main():
         single = [*farm[:3], folder / "0.obj", "-o", folder / "0.bth", "--workers", "1", "--parts", "2", "--json"]
         done = json.loads(subprocess.run(single, check=True, stdout=subprocess.PIPE).stdout)
         assert (done["farm"]["parts"], done["farm"]["objects"]) == (2, 1), done["farm"]
+        done = json.loads(subprocess.run([*single, "--", "--set", "part-triangles=256"], check=True, stdout=subprocess.PIPE).stdout)
+        assert done["farm"]["object_parts"] == done["jobs"][0]["cache"]["hits"]["part"] == 16, done
         several = [*farm[:3], folder / "0.obj", folder / "1.obj", "-o", folder / "out", "--workers", "2", "--json"]
         done = json.loads(subprocess.run(several, check=True, stdout=subprocess.PIPE).stdout)
         assert len(done["jobs"]) == 2 and (folder / "out/1.bth").read_bytes()[:3] == (folder / "0.bth").read_bytes()[:3]

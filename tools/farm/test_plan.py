@@ -94,8 +94,10 @@ def main():
         models = [folder / f"{i}.obj" for i in range(3)]
         play = ["--size", "90x50", "--spp", "2", "--mode", "path"]
         alone = {**os.environ, "BTH_NO_CACHE": "1"}
+        in_parts = ["--set", "part-triangles=256"]
         (folder / "one").mkdir()
         subprocess.run([bthc, "compile", manifest, "-o", folder / "one.bth", "-q"], check=True, env=alone)
+        subprocess.run([bthc, "compile", models[0], "-o", folder / "parts.bth", "-q", *in_parts], check=True, env=alone)
         subprocess.run([bthc, "compile", *models, "-o", folder / "one", "-q"], check=True, env=alone)
         subprocess.run([bth_play, folder / "one.bth", "-o", folder / "one/####.png", *play], check=True, stdout=subprocess.DEVNULL)
         expected = {path.name: path.read_bytes() for path in (folder / "one").iterdir()}
@@ -108,6 +110,8 @@ def main():
                 skipped.append(format)
                 continue
             assert made.read_bytes() == (folder / "one.bth").read_bytes(), format
+            run(format, plan("compile", models[0], "-o", folder / "p.bth", "--parts", 3, *to, "--", *in_parts), folder)
+            assert (folder / "p.bth").read_bytes() == (folder / "parts.bth").read_bytes(), format
             run(format, plan("compile", *models, "-o", out, "--parts", 3, *to), folder)
             run(format, plan("render", made, "-o", out / "####.png", "--parts", 2, *to, "--", *play), folder)
             assert {path.name: path.read_bytes() for path in out.iterdir()} == expected, format

@@ -9,7 +9,7 @@ use super::wide_tree::check_lines;
 use super::{BinaryBvh, CollapseReport, Node, Wide, sweep_split, zeroed};
 use bth_format::layout::{CacheLine, Child, IndexedLeaf, NODE_LINES, NONE, RawLeaf, WIDTH, WideNode};
 use bth_import::Mesh;
-use bth_import::error::Result;
+use bth_import::error::{Error, Result};
 use bth_import::monitor::{Monitor, Silent};
 use rayon::prelude::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -44,33 +44,35 @@ impl Parts {
             let enough = |count: &usize| count.saturating_mul(most) >= used.len();
             let mut counts = std::iter::successors(Some(1usize), |count| Some(count.saturating_mul(WIDTH)));
             let count = counts.find(enough).unwrap_or(1);
-            parts.split(mesh, used, count, monitor)?;
+            parts.ids = split(mesh, used, count, monitor)?;
         }
         Ok(parts)
     }
+}
 
-    /// Adds `count` parts, a power of two.
-    fn split(&mut self, mesh: &Mesh, mut ids: Vec<u32>, count: usize, monitor: &dyn Monitor) -> Result<()> {
-        monitor.check()?;
-        if count == 1 || ids.len() == 1 {
-            ids.sort_unstable();
-            self.ids.push(ids);
-            return Ok(());
-        }
-        let center = |id: u32| Bounds::of_points(&mesh.corners(id)).half_center();
-        let of_center = |id: &u32| Bounds::of_points(&[center(*id)]);
-        let all = ids.par_iter().map(of_center).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
-        let extent = |k: usize| all.upper()[k] - all.lower()[k];
-        let axis = (1..3).fold(0, |most, k| if extent(k) > extent(most) { k } else { most });
-        let mut keyed: Vec<(f32, u32)> = ids.par_iter().map(|&id| (center(id)[axis], id)).collect();
-        let middle = ids.len() / 2;
-        keyed.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        ids.par_iter_mut().zip(keyed).for_each(|(id, key)| *id = key.1);
-        let right = ids.split_off(middle);
-        ids.shrink_to_fit();
-        self.split(mesh, ids, count / 2, monitor)?;
-        self.split(mesh, right, count / 2, monitor)
+/// `count` parts, a power of two.
+fn split(mesh: &Mesh, mut ids: Vec<u32>, count: usize, monitor: &dyn Monitor) -> Result<Vec<Vec<u32>>> {
+    monitor.check()?;
+    if count == 1 || ids.len() == 1 {
+        ids.sort_unstable();
+        return Ok(vec![ids]);
     }
+    let center = |id: u32| Bounds::of_points(&mesh.corners(id)).half_center();
+    let of_center = |id: &u32| Bounds::of_points(&[center(*id)]);
+    let all = ids.par_iter().map(of_center).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
+    let extent = |k: usize| all.upper()[k] - all.lower()[k];
+    let axis = (1..3).fold(0, |most, k| if extent(k) > extent(most) { k } else { most });
+    let mut keyed: Vec<(f32, u32)> = ids.par_iter().map(|&id| (center(id)[axis], id)).collect();
+    let middle = ids.len() / 2;
+    keyed.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    ids.par_iter_mut().zip(keyed).for_each(|(id, key)| *id = key.1);
+    let right = ids.split_off(middle);
+    ids.shrink_to_fit();
+    let half = |ids| split(mesh, ids, count / 2, monitor);
+    let (left, right) = rayon::join(|| half(ids), || half(right));
+    let mut parts = left?;
+    parts.extend(right?);
+    Ok(parts)
 }
 
 /// The wide tree of a part.
@@ -87,7 +89,8 @@ pub struct Part {
 /// Joins the trees of parts. The upper nodes come first, then one part after the other.
 ///
 /// # Errors
-/// `BTH-L202` and `BTH-L203`, as for [`collapse`](super::collapse()).
+/// `BTH-L202` and `BTH-L203`, as for [`collapse`](super::collapse()); `BTH-X203` if the lines of a
+/// part are not those of a tree.
 pub fn join(parts: Vec<Part>) -> Result<(Wide, CollapseReport)> {
     let (mut joined, mut report) = (Wide { root: NONE, ..Wide::default() }, CollapseReport::default());
     let Some(first) = parts.first() else { return Ok((joined, report)) };
@@ -128,7 +131,7 @@ pub fn join(parts: Vec<Part>) -> Result<(Wide, CollapseReport)> {
         |at: usize| uppers.iter().find(|n| n.children.contains(&(at as u32))).map_or(0, |n| n.level);
     let mut line = uppers.len() * NODE_LINES;
     for (Part { mut wide, root, report: of_part }, &at) in parts.into_iter().zip(&leaf_of) {
-        move_blocks(&mut wide, line, joined.triangle_ids.len());
+        move_blocks(&mut wide, line, joined.triangle_ids.len()).ok_or_else(no_tree)?;
         joined.lines[line..line + wide.lines.len()].copy_from_slice(&wide.lines);
         line += wide.lines.len();
         joined.triangle_ids.extend(wide.triangle_ids);
@@ -140,6 +143,10 @@ pub fn join(parts: Vec<Part>) -> Result<(Wide, CollapseReport)> {
     report.measure(&joined);
     joined.root = codes[0];
     Ok((joined, report))
+}
+
+fn no_tree() -> Error {
+    Error::Internal { code: "BTH-X203", message: "the lines of a part are not those of a tree".to_owned() }
 }
 
 /// A binary tree whose leaves are parts.
@@ -212,26 +219,41 @@ fn moved(code: u32, lines: usize) -> u32 {
 }
 
 /// Moves the children of all nodes back by a number of lines, and the ids of all leaves by a number
-/// of rows.
-fn move_blocks(wide: &mut Wide, lines: usize, rows: usize) {
-    let mut stack = vec![wide.root];
+/// of rows. `None` if the lines are not those of a tree.
+fn move_blocks(wide: &mut Wide, lines: usize, rows: usize) -> Option<()> {
+    let (mut stack, mut blocks) = (vec![wide.root], 0..wide.lines.len());
     while let Some(code) = stack.pop() {
-        match Child::from_code(code) {
+        let child = Child::from_code(code);
+        if child.is_some() {
+            blocks.next()?;
+        }
+        match child {
             Some(Child::Node(line)) => {
-                let node = block::<WideNode>(&mut wide.lines, line);
+                let node = block::<WideNode>(&mut wide.lines, line)?;
                 stack.extend(node.child);
                 node.child = node.child.map(|code| moved(code, lines));
             }
-            Some(Child::Indexed(line)) => block::<IndexedLeaf>(&mut wide.lines, line).first += rows as u32,
-            Some(Child::Raw(line)) => block::<RawLeaf>(&mut wide.lines, line).first += rows as u32,
+            Some(Child::Indexed(line)) => {
+                let first = &mut block::<IndexedLeaf>(&mut wide.lines, line)?.first;
+                *first = first.checked_add(rows as u32)?;
+            }
+            Some(Child::Raw(line)) => {
+                let first = &mut block::<RawLeaf>(&mut wide.lines, line)?.first;
+                *first = first.checked_add(rows as u32)?;
+            }
             Some(Child::Tets(_)) | None => {}
         }
     }
+    Some(())
 }
 
-fn block<T: FromBytes + IntoBytes + KnownLayout + Immutable>(lines: &mut [CacheLine], line: u32) -> &mut T {
-    let bytes = &mut lines.as_mut_bytes()[line as usize * size_of::<CacheLine>()..][..size_of::<T>()];
-    T::mut_from_bytes(bytes).expect("a block is a whole number of aligned lines")
+fn block<T: FromBytes + IntoBytes + KnownLayout + Immutable>(
+    lines: &mut [CacheLine],
+    line: u32,
+) -> Option<&mut T> {
+    let start = (line as usize).checked_mul(size_of::<CacheLine>())?;
+    let bytes = lines.as_mut_bytes().get_mut(start..start.checked_add(size_of::<T>())?)?;
+    T::mut_from_bytes(bytes).ok()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use bth_format::layout::CacheLine;
 #[cfg(doc)]
 use bth_format::layout::Child;
 use bth_format::layout::WIDTH;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Wide {
 }
 
 /// Report of [`collapse`](super::collapse()).
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CollapseReport {
     /// Wide nodes.
     pub nodes: u64,

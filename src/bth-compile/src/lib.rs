@@ -25,6 +25,7 @@ mod options;
 pub mod pipeline;
 pub mod scene;
 pub mod settings;
+mod shard;
 pub mod source;
 mod stage;
 pub mod write;
@@ -34,5 +35,7 @@ pub use bth_bvh::sampling;
 use bth_bvh::vectors;
 pub use bth_tets as tets;
 pub use bth_tets::{costs, marks};
+
+pub use shard::Shard;
 
 pub use bth_import::{Error, Monitor, Place, Result, Silent, error, monitor};

@@ -60,6 +60,9 @@ pub struct CompileOptions {
     pub deformable: bool,
     /// How objects whose vertices move by themselves are compiled.
     pub motion: MotionOptions,
+    /// Objects of more triangles are built in parts of at most this number, where no other option
+    /// needs all triangles at once.
+    pub part_triangles: u64,
     /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the
     /// same time; a single object may exceed it. The result does not depend on it.
     pub objects_memory: u64,
@@ -84,6 +87,7 @@ impl Default for CompileOptions {
             geometry: true,
             deformable: false,
             motion: MotionOptions::default(),
+            part_triangles: mesh::TRIANGLES_AT_ONCE,
             objects_memory: u64::MAX,
         }
     }

@@ -17,7 +17,7 @@ struct Key {
     apply: fn(&str, &mut CompileOptions) -> Result<(), String>,
 }
 
-const KEYS: [Key; 8] = [
+const KEYS: [Key; 9] = [
     Key {
         name: "c-tet",
         values: "NANOSECONDS",
@@ -48,6 +48,12 @@ const KEYS: [Key; 8] = [
             ];
             set(&mut options.costs.optimize_for, one_of(text, &values))
         },
+    },
+    Key {
+        name: "part-triangles",
+        values: "N",
+        about: "objects of more triangles are built in parts of at most N; 16777216 by default",
+        apply: |text, options| set(&mut options.part_triangles, whole(text, 256, u32::MAX).map(u64::from)),
     },
     Key {
         name: "poses",

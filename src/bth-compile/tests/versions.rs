@@ -4,9 +4,10 @@
 #![allow(clippy::print_stdout)]
 
 use bth_cache::Store;
+use bth_compile::Shard;
 use bth_compile::cached::Cache;
 use bth_compile::costs::Select;
-use bth_compile::pipeline::{CompileOptions, Structure, compile_cached};
+use bth_compile::pipeline::{CompileOptions, Structure, compile_cached, compile_parts};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -17,11 +18,15 @@ bvh 3 85ced845a2e06b3c60ec6905522a8ae3914e4cb9826bc17089f4ec97abdefd04
 file 7.65536 146cdb2d4ca3c7ef21d3164b85dcddcae55c82d38f90beeebc4479e0d6073bda
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
 mesh 10 f9a832bfbe932ba0eec21e4aeddd484d9703aa6ac684d191644612e7ba299c39
+part 1 ddbf1a2d4bbc479073191be3b1c10733c11a57461037b79325ccdb0c5bb5786a
 ";
 
 /// As above for the tetrahedralization of a whole model, by the TetGen that made it: others make
 /// others, as do other processors' floating-point instructions.
 const NOTED_TETS: &str = "tets 1 by 1.5: 31de18e7856ad5bd3674f79c451457618bfa5c7f03af3f47b6363bcdfb702072";
+
+/// All work.
+const ONLY: Shard = Shard { number: 1, of: 1 };
 
 /// A bumpy field of 32 by 32 squares and a triangle through it, in small whole numbers.
 fn model() -> String {
@@ -52,12 +57,19 @@ fn made(folder: &Path) -> String {
         }
         let cache = Cache::new(&store, "model");
         compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
+        options.part_triangles = 1000;
+        compile_parts(&source, &options, &cache, ONLY, &bth_compile::Silent).unwrap();
     }
     let mut text = String::new();
     for entry in store.list() {
         let of =
             |name: &str| entry.components.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str());
-        if entry.stage == "file" && of("structure") != Some("bvh") {
+        let is_one = match &*entry.stage {
+            "file" => of("structure") == Some("bvh"),
+            "part" => of("part") == Some("2 of 16"),
+            _ => true,
+        };
+        if !is_one {
             continue;
         }
         let version = of(&format!("{} version", entry.stage)).unwrap();

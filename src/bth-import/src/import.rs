@@ -14,7 +14,7 @@ use crate::materials::{ImageFile, Looks};
 use crate::mesh::{Attributes, Mesh, Positions, Report, Sequence, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
-use crate::room::{BYTES_PER_TRIANGLE, check_memory};
+use crate::room::{BYTES_PER_TRIANGLE, TRIANGLES_AT_ONCE, check_memory};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
 use crate::weld::{equal_in_all_frames, equal_positions, number};
 use crate::{attributes, coordinate_range, gltf, rounding, topology};
@@ -183,7 +183,7 @@ pub(crate) fn finish(
 ) -> Result<(Mesh, Report)> {
     let count = frames.as_ref().map_or(1, |frames| frames.positions.len() as u64);
     check_triangles(raw.triangles.len() as u64)?;
-    check_memory(raw.triangles.len() as u64, BYTES_PER_TRIANGLE - READ_PER_TRIANGLE, true)?;
+    check_memory(raw.triangles.len() as u64, BYTES_PER_TRIANGLE - READ_PER_TRIANGLE, TRIANGLES_AT_ONCE)?;
     check_rows((raw.positions.len() as u64).saturating_mul(count))?;
     let moves = frames.is_some() || raw.deformation.is_some();
     let rounded = match &frames {

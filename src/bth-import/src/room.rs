@@ -5,24 +5,24 @@ use crate::error::{Error, Result};
 /// Bytes of memory that a triangle takes until it is compiled, from the reading of its
 /// model on (measured: 162 with `--quality fast`, 219 by default).
 pub const BYTES_PER_TRIANGLE: u64 = 165;
-/// Objects of more triangles are built in parts of at most this number. It is a constant, since
-/// bytes of files do not depend on the memory.
+/// Objects of more triangles are built in parts of at most this number by default. It is a constant,
+/// since bytes of files do not depend on the memory.
 pub const TRIANGLES_AT_ONCE: u64 = 1 << 24;
 /// Bytes of memory that each triangle beyond these takes.
 const BYTES_IN_PARTS: u64 = 110;
 /// Models of fewer triangles are not checked.
 const FEW: u64 = 1 << 17;
 
-/// Refuses triangles where there is less memory than they take: `each` bytes for a triangle that is
-/// built at once with all, or with a part of a large object.
+/// Refuses triangles where there is less memory than they take: `each` bytes for each of the
+/// `at_once` triangles that are built at once, if there are so many.
 ///
 /// # Errors
 /// `BTH-L034`.
-pub fn check_memory(triangles: u64, each: u64, in_parts: bool) -> Result<()> {
+pub fn check_memory(triangles: u64, each: u64, at_once: u64) -> Result<()> {
     if triangles < FEW {
         return Ok(());
     }
-    let at_once = if in_parts { triangles.min(TRIANGLES_AT_ONCE) } else { triangles };
+    let at_once = triangles.min(at_once);
     let needed = at_once.saturating_mul(each).saturating_add((triangles - at_once) * BYTES_IN_PARTS);
     let left = bth_format::memory::available();
     if needed <= left {

@@ -310,6 +310,37 @@ fn shards_of_a_scene_meet_in_the_cache() {
     }
 }
 
+/// Parts of large objects are work, too: of a single model, and of a scene's objects.
+#[test]
+fn shards_of_large_objects_meet_in_the_cache() {
+    let folder = scene(2);
+    let path = folder.path();
+    std::fs::write(path.join("1.obj"), sphere(20)).unwrap();
+    for (model, expected, kept) in [
+        ("1.obj", [(0, 6), (0, 5), (0, 5)], &["mesh 1", "part 16"][..]),
+        ("s.manifest", [(1, 5), (0, 6), (0, 5)], &["object 1", "part 16"]),
+    ] {
+        let args = [model, "--set", "part-triangles=256"];
+        let whole = cached(path, &[&["compile", "-o", "whole.bth", "--no-cache"], &args[..]].concat());
+        assert_eq!(whole.code, Some(0), "{whole:?}");
+        let shards = ["1/3", "2/3", "3/3"].map(|which| {
+            let json = compile(path, &[&args[..], &["--in-cache", "--shard", which]].concat());
+            (json["objects"].as_u64().unwrap(), json["parts"].as_u64().unwrap())
+        });
+        assert_eq!(shards, expected, "{model}");
+        let (hits, misses) = found(&compile(path, &[&args[..], &["-o", "out.bth"]].concat()));
+        assert_eq!(hits, kept, "{misses:?}");
+        let read = |name| std::fs::read(path.join(name)).unwrap();
+        assert!(read("out.bth") == read("whole.bth"));
+    }
+    let parts = cached(path, &["cache", "list", "--stage", "part", "--json"]).expect(0).json();
+    assert_eq!(parts["entries"].as_array().unwrap().len(), 16, "one set for both");
+    // A model that is not built in parts is work for one shard.
+    let small = |which| compile(path, &["0.obj", "--in-cache", "--shard", which]);
+    assert_eq!(small("2/2")["objects"], 0);
+    assert_eq!(small("1/2")["output"], "the cache");
+}
+
 #[test]
 fn what_a_cache_is_too_small_for_is_not_said_to_be_in_it() {
     let folder = folder(&[("a.obj", &sphere(16))]);

@@ -188,6 +188,22 @@ impl<'a> Cache<'a> {
         Ok(lock)
     }
 
+    /// The result of a stage, if the cache has it. `part` as in [`Cache::fetch`].
+    pub(crate) fn take<T, R: Serialize + DeserializeOwned, S: CachedStage<T, R>>(
+        &self,
+        stage: &S,
+        part: &str,
+        monitor: &dyn Monitor,
+    ) -> Option<(T, R)> {
+        let key = self.store.map(|_| stage.key())?;
+        let record = self.find(&key, monitor)?;
+        let value = stage.decode(&self.read(&record, monitor)?)?;
+        let report = R::deserialize(&record.report).ok()?;
+        self.hit(&key, part);
+        replay(&record.report, monitor);
+        Some((value, report))
+    }
+
     /// The result of a stage: from the cache if it has the result, else made and kept. `part` as in
     /// [`Cache::fetch`].
     pub(crate) fn run<T, R: Serialize + DeserializeOwned, S: CachedStage<T, R>>(
@@ -196,14 +212,11 @@ impl<'a> Cache<'a> {
         part: &str,
         monitor: &dyn Monitor,
     ) -> Result<(T, R)> {
-        let Some(key) = self.store.map(|_| stage.key()) else { return stage.run(monitor) };
-        if let Some((record, bytes)) = self.fetch(&key, part, monitor)
-            && let Some(value) = stage.decode(&bytes)
-            && let Ok(report) = R::deserialize(&record.report)
-        {
-            replay(&record.report, monitor);
-            return Ok((value, report));
+        if let Some(found) = self.take(&stage, part, monitor) {
+            return Ok(found);
         }
+        let Some(key) = self.store.map(|_| stage.key()) else { return stage.run(monitor) };
+        self.miss(&key, part);
         let recording = Recording::new(monitor);
         let (value, report) = stage.run(&recording)?;
         self.put(&key, part, &S::encode(&value), &report, &recording);

@@ -3,11 +3,13 @@
 use super::compiler::Compiler;
 use super::keys;
 use super::object::Compiled;
+use super::parts::may_be_in_parts;
 use super::report::CompileReport;
 use crate::cached::{Cache, Miss, replay, with_warnings};
 use crate::error::{Error, Result};
 use crate::monitor::{Monitor, Recording};
 use crate::options::{CompileOptions, Structure};
+use crate::shard::Shard;
 use crate::source::{MESH_NAME, Model, SourceDigest, TriangleMesh};
 use crate::stage::Clock;
 use crate::write::Content;
@@ -136,6 +138,33 @@ pub fn compile_cached<'a>(
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<CompileReport>> {
     compile_source(source.into(), options, cache, needed, monitor)
+}
+
+/// Builds those parts of a model into the cache that belong to a shard, if its object is built in
+/// parts and the cache does not have the compiled file. Returns their number; `None` if there is
+/// no part to build on any machine.
+///
+/// # Errors
+/// The errors of [`compile_cached`].
+pub fn compile_parts(
+    source: &Path,
+    options: &CompileOptions,
+    cache: &Cache<'_>,
+    shard: Shard,
+    monitor: &dyn Monitor,
+) -> Result<Option<u64>> {
+    if !may_be_in_parts(source, options) {
+        return Ok(None);
+    }
+    let mut clock = Clock::default();
+    let (digest, key) = identify(CompileInput::Model(source), options, cache, monitor, &mut clock)?;
+    let record = key.and_then(|key| cache.find(&key, monitor));
+    if record.is_some_and(|record| cache.holds(&record)) {
+        return Ok(None);
+    }
+    let mut compiler = Compiler { source, part: "", options, cache, clock: &mut clock, monitor };
+    let (mesh, _, hash) = compiler.import(&Model { path: source, digest: &digest })?;
+    compiler.parts_of(mesh, hash, shard)
 }
 
 /// What [`compile_cached`] would do. Only reads and hashes the model.

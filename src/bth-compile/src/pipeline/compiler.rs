@@ -17,10 +17,12 @@ use super::traced::TracedMesh;
 use super::tree::{BuildTree, CountVisits, TreeOptions};
 use crate::bvh::Quality;
 use crate::cached::Cache;
+use crate::coordinates::OnGrid;
 use crate::error::Result;
 use crate::free::{self, Free, FreeReport};
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
+use crate::shard::Shard;
 use crate::source::{Model, changed};
 use crate::stage::{CachedStage, Clock, Stage};
 use crate::tets;
@@ -31,6 +33,9 @@ use serde::de::DeserializeOwned;
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::path::Path;
+
+/// A mesh on its grid, if it has one, with its hash and options.
+type Placed = (Mesh, Option<OnGrid>, OnceCell<Digest>, CompileOptions);
 
 /// Compiles one object.
 pub(crate) struct Compiler<'a> {
@@ -91,19 +96,48 @@ impl<'a> Compiler<'a> {
 
     /// Compiles a mesh into an object. `hash` is the hash of its geometry, if it is known.
     pub(crate) fn object(mut self, mesh: Mesh, hash: OnceCell<Digest>) -> Result<(Object, StageReports)> {
-        self.options.check()?;
-        // Of the memory for a triangle its mesh has some already.
-        let more = if self.options.bvh.quality == Quality::Fast { 0 } else { 40 };
-        let (triangles, each) = (mesh.triangles.len(), mesh::BYTES_PER_TRIANGLE - 20 + more);
-        mesh::check_memory(triangles as u64, each, in_parts(triangles, self.options))?;
+        self.check(&mesh)?;
         if let Some(sequence) = mesh.sequence.clone() {
             warn_of_options(&self.source.display().to_string(), self.options, self.monitor);
             let options = &self.options.of_deforming();
             return Compiler { options, ..self }.moving(mesh, &sequence);
         }
+        let (mesh, on_grid, hash, options) = self.placed(mesh, hash)?;
+        Compiler { options: &options, ..self }.still(mesh, on_grid, &hash)
+    }
+
+    /// Builds those parts of an object into the cache that belong to a shard. Returns their number;
+    /// `None` if the object is not built in parts.
+    pub(crate) fn parts_of(
+        mut self,
+        mesh: Mesh,
+        hash: OnceCell<Digest>,
+        shard: Shard,
+    ) -> Result<Option<u64>> {
+        if mesh.sequence.is_some() || !in_parts(mesh.triangles.len() as u64, self.options) {
+            return Ok(None);
+        }
+        self.check(&mesh)?;
+        let (mesh, _, hash, options) = self.placed(mesh, hash)?;
+        let compiler = Compiler { options: &options, ..self };
+        compiler.building(&mesh, &hash).build_shard(shard, compiler.monitor).map(Some)
+    }
+
+    /// Refuses options that exclude each other, and a mesh without the memory for it.
+    fn check(&self, mesh: &Mesh) -> Result<()> {
+        self.options.check()?;
+        // Of the memory for a triangle its mesh has some already.
+        let more = if self.options.bvh.quality == Quality::Fast { 0 } else { 40 };
+        let (triangles, each) = (mesh.triangles.len() as u64, mesh::BYTES_PER_TRIANGLE - 20 + more);
+        let is_in_parts = in_parts(triangles, self.options);
+        mesh::check_memory(triangles, each, if is_in_parts { self.options.part_triangles } else { u64::MAX })
+    }
+
+    /// A mesh that does not move, on the grid of its coordinates, with its hash, and the options
+    /// that it is compiled with.
+    fn placed(&mut self, mesh: Mesh, hash: OnceCell<Digest>) -> Result<Placed> {
         if mesh.exact.is_some() {
-            let options = &self.options.of_exact();
-            return Compiler { options, ..self }.still(mesh, None, &hash);
+            return Ok((mesh, None, hash, self.options.of_exact()));
         }
         let (mesh, on_grid, hash) = match self.options.coordinates == Default::default() {
             true => (mesh, None, hash),
@@ -114,20 +148,20 @@ impl<'a> Compiler<'a> {
                 (mesh, on_grid, hash)
             }
         };
-        let options = &CompileOptions { structure: self.options.built_structure(), ..self.options.clone() };
-        Compiler { options, ..self }.still(mesh, on_grid, &hash)
+        let options = CompileOptions { structure: self.options.built_structure(), ..self.options.clone() };
+        Ok((mesh, on_grid, hash, options))
     }
 
     /// Compiles a mesh whose vertices do not move by themselves.
     fn still(
         mut self,
         mesh: Mesh,
-        on_grid: Option<crate::coordinates::OnGrid>,
+        on_grid: Option<OnGrid>,
         hash: &OnceCell<Digest>,
     ) -> Result<(Object, StageReports)> {
         let options = self.options;
-        if in_parts(mesh.triangles.len(), options) {
-            return self.in_parts(mesh, on_grid);
+        if in_parts(mesh.triangles.len() as u64, options) {
+            return self.in_parts(mesh, on_grid, hash);
         }
         let built =
             BuildTree { mesh: Hashed { mesh: &mesh, known: hash }, options: TreeOptions::of(options) };
@@ -139,7 +173,7 @@ impl<'a> Compiler<'a> {
             Structure::Bth | Structure::Tets => self.tet_leaves(&traced, hash)?,
         };
         let (free, free_report) = self.free_directions(&traced, hash)?;
-        let coordinates = traced.on_grid.as_ref().map(crate::coordinates::OnGrid::report);
+        let coordinates = traced.on_grid.as_ref().map(OnGrid::report);
         let (object, collapse) = self.run(Collapse { traced, leaves, free, motion: None, options })?;
         Ok((object, StageReports { coordinates, bvh, free: free_report, tets, collapse }))
     }
@@ -148,18 +182,28 @@ impl<'a> Compiler<'a> {
     fn in_parts(
         mut self,
         mesh: Mesh,
-        on_grid: Option<crate::coordinates::OnGrid>,
+        on_grid: Option<OnGrid>,
+        hash: &OnceCell<Digest>,
     ) -> Result<(Object, StageReports)> {
-        let (options, most) = (TreeOptions::of(self.options), mesh::TRIANGLES_AT_ONCE as usize);
-        let (mut hierarchy, bvh, mut collapse) = self.run(BuildInParts { mesh: &mesh, options, most })?;
+        let (mut hierarchy, bvh, mut collapse) = self.run(self.building(&mesh, hash))?;
         if let Some(on_grid) = &on_grid {
             crate::coordinates::pack(&mut hierarchy.wide, &on_grid.grid)?;
             collapse.measure(&hierarchy.wide);
         }
-        let coordinates = on_grid.as_ref().map(crate::coordinates::OnGrid::report);
+        let coordinates = on_grid.as_ref().map(OnGrid::report);
         let source = ObjectSource { mesh, on_grid, free: None, motion: None };
         let object = Object::new(source, hierarchy, Vec::new());
         Ok((object, StageReports { coordinates, bvh, collapse, ..StageReports::default() }))
+    }
+
+    /// The stage that builds the tree of a mesh in parts.
+    fn building<'b>(&self, mesh: &'b Mesh, known: &'b OnceCell<Digest>) -> BuildInParts<'b>
+    where
+        'a: 'b,
+    {
+        let Self { part: name, options, cache, .. } = *self;
+        let (mesh, most) = (Hashed { mesh, known }, options.part_triangles as usize);
+        BuildInParts { mesh, options: TreeOptions::of(options), most, cache, name }
     }
 
     /// Compiles a mesh whose vertices move, with the options of deformable objects

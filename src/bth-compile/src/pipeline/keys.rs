@@ -21,6 +21,7 @@ use crate::tets::TetOptions;
 use crate::write::{DeformerParts, SceneParts};
 use bth_cache::Key;
 use bth_files::Digest;
+use bth_import::TRIANGLES_AT_ONCE;
 use std::path::Path;
 
 /// Version of compiled files.
@@ -111,6 +112,7 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         geometry,
         deformable,
         motion,
+        part_triangles,
         // The result does not depend on it.
         objects_memory: _,
     } = options;
@@ -137,6 +139,9 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         ("file version", format!("{FILE}.{}", bth_format::layout::WRITER_VERSION)),
         ("bthc", env!("CARGO_PKG_VERSION").to_owned()),
     ];
+    if *part_triangles != TRIANGLES_AT_ONCE {
+        all.push(("triangles of parts", part_triangles.to_string()));
+    }
     if structure != Structure::Bvh {
         let TetOptions { cells, minimum, .. } = tets;
         all.extend([

@@ -27,7 +27,7 @@ mod tree;
 
 pub use crate::options::{CompileOptions, MotionOptions, Structure};
 pub use crate::stage::StageTime;
-pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cached, dry_run};
+pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cached, compile_parts, dry_run};
 pub use direct::{compile_fast, compile_model_fast, fast_model};
 pub use object::Compiled;
 pub use report::{CompileReport, FileReport, MotionReport};
@@ -38,4 +38,5 @@ pub(crate) use compiler::Compiler;
 pub(crate) use import::Import;
 pub(crate) use keys::{MOTION, ObjectKeys, scene};
 pub(crate) use moving::{PoseSource, warn_of_options};
+pub(crate) use parts::{in_parts, may_be_in_parts};
 pub(crate) use provenance::of_scene as provenance_of_scene;

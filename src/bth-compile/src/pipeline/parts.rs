@@ -1,33 +1,49 @@
 //! The wide BVH of a mesh of very many triangles, built in parts: a binary tree takes several times
-//! the memory of the mesh and of the wide tree.
+//! the memory of the mesh and of the wide tree. Many machines can build the parts into the cache;
+//! without them the cache keeps no parts.
 
 use super::hashed::Hashed;
-use super::object::Hierarchy;
+use super::object::{Collapse, Hierarchy};
 use super::tree::{BuildTree, CountVisits, TreeOptions, rebuilt};
-use crate::bvh::{self, BvhReport, CollapseOptions, CollapseReport, Part, Parts, Weighed};
+use crate::bvh::{self, BvhReport, CollapseOptions, CollapseReport, Node, Part, Parts, Weighed, Wide};
+use crate::cached::{Cache, Codec, RowReader, Sink, decode, encode, text};
 use crate::error::Result;
 use crate::free::KeepFree;
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
-use crate::stage::Stage;
-use bth_import::{Mesh, TRIANGLES_AT_ONCE};
-use std::cell::OnceCell;
+use crate::shard::Shard;
+use crate::stage::{CachedStage, Stage};
+use bth_cache::Key;
+use rayon::slice::ParallelSliceMut;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Builds the wide tree of a mesh in parts of at most `most` triangles.
 pub(super) struct BuildInParts<'a> {
-    pub(super) mesh: &'a Mesh,
+    pub(super) mesh: Hashed<'a>,
     pub(super) options: TreeOptions<'a>,
     pub(super) most: usize,
+    pub(super) cache: &'a Cache<'a>,
+    /// Names the object within the source in explanations of misses.
+    pub(super) name: &'a str,
 }
 
 /// Returns true if a mesh of this size is built in parts with these options: those that need the
 /// binary tree of all triangles exclude it.
-pub(super) fn in_parts(triangles: usize, options: &CompileOptions) -> bool {
-    triangles as u64 > TRIANGLES_AT_ONCE
+pub(crate) fn in_parts(triangles: u64, options: &CompileOptions) -> bool {
+    triangles > options.part_triangles
         && !options.deformable
         && options.structure != Structure::Tets
         && options.free.keep == KeepFree::None
         && options.costs.rays.is_none()
+}
+
+/// Returns false if a model has too few bytes for an object that is built in parts, so that it need
+/// not be imported to know. glTF, FBX and 3MF files may be compressed, or refer to others; of other
+/// formats the triangles take at least four bytes.
+pub(crate) fn may_be_in_parts(model: &Path, options: &CompileOptions) -> bool {
+    let bytes = std::fs::metadata(model).map_or(0, |metadata| metadata.len());
+    in_parts(bytes / 4, options) || bth_import::is_scene(model) && in_parts(u64::MAX, options)
 }
 
 impl Stage for BuildInParts<'_> {
@@ -36,93 +52,132 @@ impl Stage for BuildInParts<'_> {
     const VERSION: &'static str = "1";
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
-        let Self { mesh, options, most } = self;
-        let Parts { ids, whole } = Parts::of(mesh, most, monitor)?;
+        let Parts { ids, whole } = Parts::of(self.mesh.mesh, self.most, monitor)?;
         let area = whole.map_or(0.0, |whole| whole.half_area());
-        let (mut parts, mut reports) = (Vec::with_capacity(ids.len()), BvhReport::default());
-        for ids in ids {
-            let built = bvh::build_part(mesh, &ids, options.bvh.quality, monitor)?;
-            drop(ids);
-            let (tree, report) = rebuilt(mesh, built, &options, monitor)?;
-            let hashed = Hashed { mesh, known: &OnceCell::new() };
-            let visits =
-                CountVisits { built: BuildTree { mesh: hashed, options }, tree: &tree }.run(monitor)?;
-            let weighed = Weighed { bvh: &tree, probabilities: visits.as_deref() };
-            let collapse = CollapseOptions { whole, ..CollapseOptions::default() };
-            let (wide, of_part) = bvh::collapse(mesh, weighed, &[], &collapse, monitor)?;
-            let root = tree.nodes[0];
-            reports.add(&report, if area > 0.0 { root.half_area() / area } else { 0.0 });
-            parts.push(Part { wide, root, report: of_part });
+        let count = ids.len();
+        let (mut parts, mut reports) = (Vec::with_capacity(count), BvhReport::default());
+        for (number, ids) in ids.into_iter().enumerate() {
+            let part = self.part(&ids, whole, (number, count));
+            let found = self.cache.take(&part, &self.name_of(number), monitor);
+            let (Tree { wide, root }, report) = found.map_or_else(|| part.run(monitor), Ok)?;
+            reports.add(&report.bvh, if area > 0.0 { root.half_area() / area } else { 0.0 });
+            parts.push(Part { wide, root, report: report.collapse });
         }
-        reports.dropped = mesh.triangles.len() as u64 - reports.triangles;
+        reports.dropped = self.mesh.mesh.triangles.len() as u64 - reports.triangles;
         let (wide, report) = bvh::join(parts)?;
         let bounds = whole.map(|whole| (whole.lower, whole.upper));
         Ok((Hierarchy { wide, bounds, dropped: reports.dropped as u32 }, reports, report))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pipeline::object::{Object, ObjectSource};
-    use crate::pipeline::{build_tree, compile};
-    use crate::source::TriangleMesh;
-    use bth::rays::Ray;
-    use bth_import::{PositionRows, Silent, import_triangles};
-    use std::path::Path;
-
-    /// The file of a mesh that is built in parts.
-    fn file_in_parts(model: &TriangleMesh<'_>, most: usize, options: &CompileOptions) -> bth_format::File {
-        let TriangleMesh { positions, triangles } = *model;
-        let (mesh, _) =
-            import_triangles(Path::new("mesh"), positions, triangles, options.wanted(), &Silent).unwrap();
-        let stage = BuildInParts { mesh: &mesh, options: TreeOptions::of(options), most };
-        let (hierarchy, bvh, _) = stage.run(&Silent).unwrap();
-        let (tree, whole) = build_tree(&mesh, options, &Silent).unwrap();
-        assert_eq!((bvh.triangles, bvh.dropped), (whole.triangles, whole.dropped));
-        assert_eq!(hierarchy.bounds, tree.nodes.first().map(|root| (root.lower, root.upper)));
-        let source = ObjectSource { mesh, on_grid: None, free: None, motion: None };
-        Object::new(source, hierarchy, Vec::new()).file(String::new(), &[], options).unwrap().0
+impl BuildInParts<'_> {
+    /// Builds the parts that belong to a shard into the cache. Returns their number.
+    pub(super) fn build_shard(&self, shard: Shard, monitor: &dyn Monitor) -> Result<u64> {
+        let Parts { ids, whole } = Parts::of(self.mesh.mesh, self.most, monitor)?;
+        let count = ids.len();
+        let mut built = 0;
+        for (number, ids) in ids.iter().enumerate().filter(|(number, _)| shard.has(*number as u64)) {
+            let part = self.part(ids, whole, (number, count));
+            self.cache.run(part, &self.name_of(number), monitor)?;
+            built += 1;
+        }
+        Ok(built)
     }
 
-    /// Answers equal the answers of the file that is built at once, and every byte is verified.
-    #[test]
-    fn files_of_parts_are_whole_and_answer_alike() {
-        let mut random = bth_random::Rng::new(11);
-        let mut positions: Vec<[f32; 3]> = Vec::new();
-        let mut triangles = vec![[0, 0, 1]];
-        for i in 0..3000 {
-            let center = [0; 3].map(|_: i32| random.unit_f64() as f32 * 10.0);
-            positions.extend([0; 3].map(|_: i32| center.map(|x| x + random.unit_f64() as f32)));
-            triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
-        }
-        let model = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
-        for options in
-            [CompileOptions::fast(), CompileOptions { structure: Structure::Bvh, ..Default::default() }]
-        {
-            let (whole, _) = compile(model, &options, &Silent).unwrap();
-            let whole = bth::from_bytes(&whole.bytes).unwrap();
-            for most in [17, 400, 2999] {
-                let file = file_in_parts(&model, most, &options);
-                bth_format::verify::verify(&file).unwrap();
-                let scene = bth::from_file(file).unwrap();
-                for _ in 0..500 {
-                    let [origin, to] = [0; 2].map(|_| [0; 3].map(|_: i32| random.unit_f64() as f32 * 10.0));
-                    let ray = Ray::new(origin, [0, 1, 2].map(|k| to[k] - origin[k]));
-                    assert_eq!(scene.nearest(&ray), whole.nearest(&ray));
-                }
-            }
-        }
+    fn part<'b>(&'b self, ids: &'b [u32], whole: Option<Node>, number: (usize, usize)) -> BuildPart<'b> {
+        BuildPart { mesh: self.mesh, options: self.options, ids, whole, number }
     }
 
-    #[test]
-    fn only_what_needs_no_tree_of_all_triangles_is_built_in_parts() {
-        let many = TRIANGLES_AT_ONCE as usize + 1;
-        let mut options = CompileOptions::default();
-        assert!(in_parts(many, &options) && !in_parts(many - 1, &options));
-        options.deformable = true;
-        assert!(!in_parts(many, &options));
-        let tets = CompileOptions { structure: Structure::Tets, ..CompileOptions::default() };
-        assert!(!in_parts(many, &tets));
+    fn name_of(&self, number: usize) -> String {
+        format!("{} part {}", self.name, number + 1).trim_start().to_owned()
     }
 }
+
+/// Builds the wide tree of one part.
+struct BuildPart<'a> {
+    mesh: Hashed<'a>,
+    options: TreeOptions<'a>,
+    ids: &'a [u32],
+    /// A node over all parts.
+    whole: Option<Node>,
+    /// Its number from 0, and the number of all.
+    number: (usize, usize),
+}
+
+/// The wide tree of a part, and the root of its binary tree.
+struct Tree {
+    wide: Wide,
+    root: Node,
+}
+
+/// The reports on a part.
+#[derive(Serialize, Deserialize)]
+struct PartReport {
+    bvh: BvhReport,
+    collapse: CollapseReport,
+}
+
+impl Stage for BuildPart<'_> {
+    type Output = (Tree, PartReport);
+    const NAME: &'static str = "part";
+    const VERSION: &'static str = BuildInParts::VERSION;
+
+    fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
+        let Self { mesh, options, ids, whole, .. } = self;
+        let built = bvh::build_part(mesh.mesh, ids, options.bvh.quality, monitor)?;
+        let (tree, bvh) = rebuilt(mesh.mesh, built, &options, monitor)?;
+        let visits = CountVisits { built: BuildTree { mesh, options }, tree: &tree }.run(monitor)?;
+        let weighed = Weighed { bvh: &tree, probabilities: visits.as_deref() };
+        let options = CollapseOptions { whole, ..CollapseOptions::default() };
+        let (wide, collapse) = bvh::collapse(mesh.mesh, weighed, &[], &options, monitor)?;
+        Ok((Tree { wide, root: tree.nodes[0] }, PartReport { bvh, collapse }))
+    }
+}
+
+impl CachedStage<Tree, PartReport> for BuildPart<'_> {
+    fn key(&self) -> Key {
+        Key::new(Self::NAME)
+            .with("geometry", self.mesh.hash())
+            .with("quality", text(&self.options.bvh.quality))
+            .with("part", format!("{} of {}", self.number.0 + 1, self.number.1))
+            .with("bvh version", BuildTree::VERSION)
+            .with("collapse version", Collapse::VERSION)
+            .with("part version", Self::VERSION)
+    }
+
+    fn encode(tree: &Tree) -> Vec<u8> {
+        encode(tree)
+    }
+
+    fn decode(&self, bytes: &[u8]) -> Option<Tree> {
+        let tree: Tree = decode(bytes)?;
+        let mut ids = tree.wide.triangle_ids.clone();
+        ids.par_sort_unstable();
+        (ids == self.ids).then_some(tree)
+    }
+}
+
+impl Codec for Tree {
+    fn write(&self, to: &mut impl Sink) {
+        let Tree { wide, root: Node { lower, upper, first, count, right } } = self;
+        let Wide { lines, triangle_ids, leaf_vertices, widened_boxes, root, depth } = wide;
+        to.add(lines);
+        to.add(triangle_ids);
+        to.add(leaf_vertices);
+        to.add(&[u32::from(*widened_boxes), *root, *depth, *first, *count, *right]);
+        to.add(&[*lower, *upper]);
+    }
+
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
+        let (lines, triangle_ids, leaf_vertices) = (from.take()?, from.take()?, from.take()?);
+        let [widened_boxes, root, depth, first, count, right] = Codec::read(from)?;
+        let [lower, upper] = Codec::read(from)?;
+        let widened_boxes = widened_boxes == 1;
+        let wide = Wide { lines, triangle_ids, leaf_vertices, widened_boxes, root, depth };
+        Some(Tree { wide, root: Node { lower, upper, first, count, right } })
+    }
+}
+
+#[cfg(test)]
+#[path = "parts_tests.rs"]
+mod tests;

@@ -5,12 +5,13 @@ use super::context::Context;
 use super::objects::{self, Objects};
 use super::plan::ScenePlan;
 use super::report::{ObjectReport, SceneReport};
-use super::{deformers, encode, meshes, sources, visible, whole_files};
+use super::{deformers, encode, meshes, object, sources, visible, whole_files};
 use crate::cached::{Cache, HashedRows, Sink};
 use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
 use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetch};
+use crate::shard::Shard;
 use crate::stage::Clock;
 use crate::write::{self, Content, FileBuilder, SceneParts, SectionHead};
 use bth::Trees;
@@ -122,8 +123,18 @@ fn warn_of_flattened(manifest: &Manifest, monitor: &dyn Monitor) {
     }
 }
 
-/// Compiles part `shard.0` (from 1) of `shard.1` parts of a scene's objects into the cache. Returns
-/// the number of objects in this part.
+/// What a shard has done of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ShardReport {
+    /// Objects of the shard.
+    pub objects: u64,
+    /// Parts of objects that are built in parts.
+    pub parts: u64,
+}
+
+/// Compiles those objects of a scene into the cache that belong to a shard. Where there are fewer
+/// objects than shards, the parts of an object that is built in parts are shared, too: part `p` of
+/// object `o`, both from 0, belongs to the shard of object `o + p`.
 ///
 /// # Errors
 /// The errors of [`compile_cached`].
@@ -132,23 +143,29 @@ pub fn compile_objects(
     source: SceneSource<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,
-    shard: (u32, u32),
+    shard: Shard,
     monitor: &dyn Monitor,
-) -> Result<u64> {
+) -> Result<ShardReport> {
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
     let manifest = &*whole_files::expanded(manifest, source.folder, monitor)?;
     let mut plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
-    let mut row = 0;
+    let all: usize = plan.sources.iter().map(|file| file.parts.len()).sum();
+    let (mut first, mut parts) = (0, 0);
     for file in &mut plan.sources {
+        let share = (all as u64) < u64::from(shard.of);
+        let shared =
+            if share { object::parts_of(file, (shard, first), &context, &mut clock)? } else { Vec::new() };
+        parts += shared.iter().flatten().sum::<u64>();
+        let mut rows = (first..).zip(shared.into_iter().chain(std::iter::repeat(None)));
+        first += file.parts.len() as u64;
         file.parts.retain(|_| {
-            row += 1;
-            !file.compiled && (row - 1) % shard.1 == shard.0 - 1
+            rows.next().is_some_and(|(row, shared)| !file.compiled && shared.is_none() && shard.has(row))
         });
     }
     plan.sources.retain(|file| !file.parts.is_empty());
-    let objects = objects::build(manifest, &plan.sources, &context, &mut clock)?;
-    Ok(objects.reports.len() as u64)
+    let objects = objects::build(manifest, &plan.sources, &context, &mut clock)?.reports.len() as u64;
+    Ok(ShardReport { objects, parts })
 }
 
 /// What [`compile_cached`] would do. Only reads and hashes the sources.

@@ -31,7 +31,7 @@ mod sources;
 mod visible;
 mod whole_files;
 
-pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
+pub use compile::{CachePolicy, SceneSource, ShardReport, compile, compile_cached, compile_objects, dry_run};
 pub use files::files;
 pub(crate) use in_memory::compile_meshes;
 pub use in_memory::{Instance, SceneNames};

@@ -2,7 +2,7 @@
 //! same.
 
 use super::context::Context;
-use super::meshes::{SourceMesh, object_key};
+use super::meshes::{self, SourceMesh, object_key};
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
 use super::sources::File;
@@ -10,7 +10,8 @@ use crate::cached::replay;
 use crate::error::Result;
 use crate::monitor::{Monitor, Recording};
 use crate::options::CompileOptions;
-use crate::pipeline::{Compiler, warn_of_options};
+use crate::pipeline::{Compiler, in_parts, may_be_in_parts, warn_of_options};
+use crate::shard::Shard;
 use crate::stage::Clock;
 use crate::tets;
 use crate::write::{self, FileBuilder, object as object_sections};
@@ -66,6 +67,36 @@ pub(super) fn build(
     let pinned = kept.and_then(|kept| context.keeper.pin(&kept, cache, *monitor));
     let found = pinned.map_or(Fetched::InMemory(built), Fetched::Pinned);
     Ok(BuiltObject { sections: found.keep(context)?, record })
+}
+
+/// Builds those parts of a file's objects into the cache that belong to a shard, as
+/// [`compile_objects`](super::compile_objects) says; `first` is the number of the file's first
+/// object. Returns for each object the number of its parts here; `None` if it is not built in parts
+/// or in the cache as a whole.
+pub(super) fn parts_of(
+    file: &File<'_>,
+    (shard, first): (Shard, u64),
+    context: &Context<'_>,
+    clock: &mut Clock,
+) -> Result<Vec<Option<u64>>> {
+    let Context { options, cache, monitor, .. } = *context;
+    if file.compiled || file.moving.is_some() || !may_be_in_parts(&file.full, options) {
+        return Ok(Vec::new());
+    }
+    let mut one = |(row, mut mesh): (u64, SourceMesh)| {
+        let SourceMesh { summary, part, .. } = &mesh;
+        let (name, hash) = (file.name_of(*part), summary.geometry);
+        let key = object_key(summary, *part, context);
+        let kept = key.and_then(|key| cache.find(&key, monitor)).is_some_and(|record| cache.holds(&record));
+        if kept || summary.deforms() || !in_parts(summary.report.triangles, options) {
+            return Ok(None);
+        }
+        let triangles = mesh.take(file, context)?;
+        let source = file.full.as_path();
+        let compiler = Compiler { source, part: &name, options, cache, clock: &mut *clock, monitor };
+        compiler.parts_of(triangles, hash.into(), shard.from(row))
+    };
+    (first..).zip(meshes::read(file, context)?).map(&mut one).collect()
 }
 
 /// An object in memory or in the cache.

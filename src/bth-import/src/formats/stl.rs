@@ -6,7 +6,7 @@ use super::{Format, first_word};
 use crate::error::Result;
 use crate::mesh::Wanted;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
-use crate::room::{BYTES_PER_TRIANGLE, check_memory};
+use crate::room::{BYTES_PER_TRIANGLE, TRIANGLES_AT_ONCE, check_memory};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 use crate::text::{Lines, point, shown, text, without_mark, words};
 
@@ -63,7 +63,7 @@ fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
         return Err(source.error_at_byte(TRUNCATED, data.len(), message, TRUNCATED_HINT));
     }
     check_triangles(u64::from(count))?;
-    check_memory(u64::from(count), BYTES_PER_TRIANGLE, true)?;
+    check_memory(u64::from(count), BYTES_PER_TRIANGLE, TRIANGLES_AT_ONCE)?;
     let extra = body.len() - count as usize * FACET;
     if extra > 0 {
         source.monitor.warn(&format!("{extra} bytes after the last facet are ignored"));

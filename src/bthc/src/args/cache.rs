@@ -58,7 +58,7 @@ pub(crate) enum CacheCommand {
     /// All entries, by stage and time of use.
     List {
         /// Only this stage.
-        #[arg(long, value_parser = ["mesh", "bvh", "free-directions", "marks", "tets", "object", "file", "scene"])]
+        #[arg(long, value_parser = ["mesh", "bvh", "free-directions", "marks", "tets", "part", "object", "file", "scene"])]
         stage: Option<String>,
     },
     /// Remove what was used longest ago until the size is kept, and what killed processes left.

@@ -1,6 +1,7 @@
 //! Options for compiling many models, and for build systems.
 
 use super::common::{JOBS, output_file};
+use bth_compile::Shard;
 use clap::Args as Group;
 use std::path::PathBuf;
 
@@ -32,14 +33,15 @@ pub(crate) struct Jobs {
     #[arg(long, help_heading = JOBS)]
     pub(crate) end_with_input: bool,
     /// Compile only part I of N of the models (from 1), or of a scene's objects into the cache: for
-    /// many machines.
+    /// many machines. With --in-cache also of the parts in which large objects are built.
     #[arg(long, help_heading = JOBS, value_name = "I/N", value_parser = shard, conflicts_with_all = ["watch", "depfile"])]
-    pub(crate) shard: Option<(u32, u32)>,
+    pub(crate) shard: Option<Shard>,
 }
 
-fn shard(text: &str) -> Result<(u32, u32), String> {
-    let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    parts
-        .filter(|(i, n)| 1 <= *i && i <= n)
+fn shard(text: &str) -> Result<Shard, String> {
+    let shard = |(i, n): (&str, &str)| Some(Shard { number: i.parse().ok()?, of: n.parse().ok()? });
+    text.split_once('/')
+        .and_then(shard)
+        .filter(|shard| 1 <= shard.number && shard.number <= shard.of)
         .ok_or_else(|| format!("expected I/N with I from 1 to N, such as 2/8, found {text:?}"))
 }

@@ -43,13 +43,14 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         objects_memory: jobs::memory_of_objects(args, jobs.len()),
         ..args.options(&progress)?
     };
-    let mut context = JobContext { args, options, store };
+    let is_shared =
+        matches!(&jobs[..], [job] if job.target == Target::Cache || scene::is_scene(&job.model, args));
+    let shard = args.jobs.shard.filter(|_| is_shared);
+    let mut context = JobContext { args, options, store, shard };
     check_outputs(&context, &jobs)?;
-    if let Some((part, parts)) = args.jobs.shard
-        && !(jobs.len() == 1 && scene::is_scene(&jobs[0].model, args))
-    {
-        let in_shard = |i: usize| i % parts as usize == part as usize - 1;
-        jobs = jobs.into_iter().enumerate().filter(|(i, _)| in_shard(*i)).map(|(_, job)| job).collect();
+    if let Some(shard) = args.jobs.shard.filter(|_| !is_shared) {
+        let mut numbers = 0..;
+        jobs.retain(|_| numbers.next().is_some_and(|number| shard.has(number)));
     }
     if args.jobs.dry_run {
         return dry_run::show(&context, &jobs, progress);

@@ -6,6 +6,8 @@ use super::{deliver, scene};
 use crate::failure::Failure;
 use bth_compile::Monitor;
 use bth_compile::monitor::Recording;
+use bth_compile::pipeline;
+use bth_compile::scene::ShardReport;
 use serde_json::Value;
 
 /// Compiles a model or scene, or takes it from the cache, and brings it to its target. The report
@@ -39,9 +41,16 @@ fn compile_job(context: &JobContext<'_>, job: &Job, monitor: &dyn Monitor) -> Re
         return scene::compile(context, job, monitor);
     }
     let cache = cache(context, job);
+    if let Some(shard) = context.shard {
+        scene::check_store(context)?;
+        let parts = pipeline::compile_parts(&job.model, &context.options, &cache, shard, monitor)?;
+        if parts.is_some() || !shard.has(0) {
+            let parts = parts.unwrap_or_default();
+            return scene::shard_report(job, &cache, ShardReport { objects: 0, parts });
+        }
+    }
     let needed = |record: &_| job.target.needs(record, context.store.as_ref());
-    let mut outcome =
-        bth_compile::pipeline::compile_cached(&job.model, &context.options, &cache, &needed, monitor)?;
+    let mut outcome = pipeline::compile_cached(&job.model, &context.options, &cache, &needed, monitor)?;
     let files = || {
         let mut files = bth_compile::source::files(&job.model, context.options.looks())?;
         files.extend(context.args.selection.rays.clone());

@@ -3,6 +3,7 @@
 use crate::args::Compile;
 use crate::failure::Failure;
 use bth_cache::{Digest, Record, Store};
+use bth_compile::Shard;
 use bth_compile::cached::Cache;
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::write;
@@ -25,6 +26,8 @@ pub(super) struct JobContext<'a> {
     pub(super) args: &'a Compile,
     pub(super) options: CompileOptions,
     pub(super) store: Option<Store>,
+    /// The shard of the only job whose work is compiled into the cache.
+    pub(super) shard: Option<Shard>,
 }
 
 /// Where a compiled file goes.

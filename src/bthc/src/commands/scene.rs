@@ -9,7 +9,7 @@ use crate::table::{Table, bytes, count};
 use bth_compile::Monitor;
 use bth_compile::cached::Cache;
 use bth_compile::pipeline::DryRun;
-use bth_compile::scene::{self, CachePolicy, SceneReport, SceneSource};
+use bth_compile::scene::{self, CachePolicy, SceneReport, SceneSource, ShardReport};
 use bth_compile::source;
 use bth_import::Looks;
 use bth_import::gltf::scene::{ImportReport, file_name, import};
@@ -57,19 +57,10 @@ pub(super) fn compile(
     let (manifest, import) = read(&job.model, &context.args.gltf, monitor)?;
     let cache = job::cache(context, job);
     let source = SceneSource { folder: folder(&job.model), name: &job.model };
-    if let Some(shard) = context.args.jobs.shard {
-        if context.store.is_none() {
-            return Err(Failure::Usage {
-                message: "--shard keeps the objects of a scene in the cache, and there is none".to_owned(),
-                hint: "leave --no-cache and BTH_NO_CACHE out, and name a folder with --cache-dir or BTH_CACHE_DIR",
-            });
-        }
-        let built = scene::compile_objects(&manifest, source, &context.options, &cache, shard, monitor)?;
-        if cache.log().failed {
-            let message = "the compiled objects could not be kept";
-            return Err(Failure::file("BTH-O061", Path::new("the cache"), &message));
-        }
-        return Ok(shard_report(job, &cache, built));
+    if let Some(shard) = context.shard {
+        check_store(context)?;
+        let done = scene::compile_objects(&manifest, source, &context.options, &cache, shard, monitor)?;
+        return shard_report(job, &cache, done);
     }
     let policy = CachePolicy {
         whole: job.target == Target::Cache,
@@ -89,19 +80,32 @@ pub(super) fn compile(
     Ok(report)
 }
 
-/// The report of a shard of a scene's objects.
-fn shard_report(job: &Job, cache: &Cache<'_>, built: u64) -> JobReport {
-    let line = format!("{}  {} objects  compiled into the cache", job.model.display(), count(built));
-    let log = cache.log();
-    JobReport {
-        json: json!({
-            "model": job.name(),
-            "objects": built,
-            "cache": {"hits": log.hits, "misses": log.misses},
-        }),
-        text: format!("{line}\n"),
-        line,
+/// Fails without a cache, where the work of a shard would be lost.
+pub(super) fn check_store(context: &JobContext<'_>) -> Result<(), Failure> {
+    let usage = Failure::Usage {
+        message: "--shard keeps objects and their parts in the cache, and there is none".to_owned(),
+        hint: "leave --no-cache and BTH_NO_CACHE out, and name a folder with --cache-dir or BTH_CACHE_DIR",
+    };
+    if context.store.is_some() { Ok(()) } else { Err(usage) }
+}
+
+/// The report of a shard of objects and their parts.
+pub(super) fn shard_report(job: &Job, cache: &Cache<'_>, done: ShardReport) -> Result<JobReport, Failure> {
+    let (log, ShardReport { objects, parts }) = (cache.log(), done);
+    if log.failed {
+        let message = "what was compiled could not be kept";
+        return Err(Failure::file("BTH-O061", Path::new("the cache"), &message));
     }
+    let of_parts = if parts > 0 { format!(", {} parts", count(parts)) } else { String::new() };
+    let line =
+        format!("{}  {} objects{of_parts}  compiled into the cache", job.model.display(), count(objects));
+    let json = json!({
+        "model": job.name(),
+        "objects": objects,
+        "parts": parts,
+        "cache": {"hits": log.hits, "misses": log.misses},
+    });
+    Ok(JobReport { json, text: format!("{line}\n"), line })
 }
 
 /// What a compilation of a scene would do.

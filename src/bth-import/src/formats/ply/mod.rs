@@ -14,7 +14,7 @@ use super::{Format, first_word};
 use crate::error::{Place, Result};
 use crate::mesh::Wanted;
 use crate::raw::{Raw, check_rows};
-use crate::room::{BYTES_PER_TRIANGLE, check_memory};
+use crate::room::{BYTES_PER_TRIANGLE, TRIANGLES_AT_ONCE, check_memory};
 use crate::source::Source;
 
 /// PLY, text and binary.
@@ -38,7 +38,7 @@ fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let faces = header.elements.iter().filter(|e| e.kind == ElementKind::Faces);
     // A triangle has 4 bytes in the file, so that a wrong count is told as what it is.
     let faces = faces.map(|e| e.count).fold(0, u64::saturating_add).min(source.data.len() as u64 / 4);
-    check_memory(faces, BYTES_PER_TRIANGLE, true)?;
+    check_memory(faces, BYTES_PER_TRIANGLE, TRIANGLES_AT_ONCE)?;
     let raw = Raw::new("ply", Box::new(|_, _| Place::File(source.path.to_owned())));
     let mut sink = Sink::new(raw, &header, wanted);
     for element in header.elements.iter().filter(|e| e.kind == ElementKind::Edges) {

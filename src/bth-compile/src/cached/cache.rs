@@ -99,18 +99,12 @@ impl<'a> Cache<'a> {
         self.store.is_some_and(|store| store.holds(record))
     }
 
-    /// Record and content of a key, counted as hit or miss. `part` tells apart what has the same
-    /// subject.
+    /// Record and content of a key, counted as a hit. `part` tells apart what has the same subject.
     pub(crate) fn fetch(&self, key: &Key, part: &str, monitor: &dyn Monitor) -> Option<(Record, Vec<u8>)> {
-        let found = self.find(key, monitor).and_then(|record| {
-            let bytes = self.read(&record, monitor)?;
-            Some((record, bytes))
-        });
-        match &found {
-            Some(_) => self.hit(key, part),
-            None => self.miss(key, part),
-        }
-        found
+        let record = self.find(key, monitor)?;
+        let bytes = self.read(&record, monitor)?;
+        self.hit(key, part);
+        Some((record, bytes))
     }
 
     /// Keeps a content, with the warnings that were given while it was made; a failure is a
@@ -196,10 +190,8 @@ impl<'a> Cache<'a> {
         monitor: &dyn Monitor,
     ) -> Option<(T, R)> {
         let key = self.store.map(|_| stage.key())?;
-        let record = self.find(&key, monitor)?;
-        let value = stage.decode(&self.read(&record, monitor)?)?;
-        let report = R::deserialize(&record.report).ok()?;
-        self.hit(&key, part);
+        let (record, bytes) = self.fetch(&key, part, monitor)?;
+        let (value, report) = (stage.decode(&bytes)?, R::deserialize(&record.report).ok()?);
         replay(&record.report, monitor);
         Some((value, report))
     }

@@ -74,6 +74,7 @@ impl NodeRunner for CachedNodes<'_> {
             report.node = job.node;
             return Ok(NodeResult { built, report, no_worker: false, reproducible: true });
         }
+        self.cache.miss(&key, "");
         let result = TimedNodes.run(job, build)?;
         if result.reproducible {
             let encoded = |mesh| encode(&with_ids_of_node(mesh, &input));

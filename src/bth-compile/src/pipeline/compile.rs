@@ -164,7 +164,7 @@ pub fn compile_parts(
     }
     let mut compiler = Compiler { source, part: "", options, cache, clock: &mut clock, monitor };
     let (mesh, _, hash) = compiler.import(&Model { path: source, digest: &digest })?;
-    compiler.parts_of(mesh, hash, shard)
+    compiler.parts_of(mesh, hash, (shard, 0))
 }
 
 /// What [`compile_cached`] would do. Only reads and hashes the model.

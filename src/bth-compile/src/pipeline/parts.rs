@@ -15,7 +15,6 @@ use crate::shard::Shard;
 use crate::stage::{CachedStage, Stage};
 use bth_cache::Key;
 use rayon::slice::ParallelSliceMut;
-use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Builds the wide tree of a mesh in parts of at most `most` triangles.
@@ -59,9 +58,9 @@ impl Stage for BuildInParts<'_> {
         for (number, ids) in ids.into_iter().enumerate() {
             let part = self.part(&ids, whole, (number, count));
             let found = self.cache.take(&part, &self.name_of(number), monitor);
-            let (Tree { wide, root }, report) = found.map_or_else(|| part.run(monitor), Ok)?;
-            reports.add(&report.bvh, if area > 0.0 { root.half_area() / area } else { 0.0 });
-            parts.push(Part { wide, root, report: report.collapse });
+            let ((wide, root), (bvh, report)) = found.map_or_else(|| part.run(monitor), Ok)?;
+            reports.add(&bvh, if area > 0.0 { root.half_area() / area } else { 0.0 });
+            parts.push(Part { wide, root, report });
         }
         reports.dropped = self.mesh.mesh.triangles.len() as u64 - reports.triangles;
         let (wide, report) = bvh::join(parts)?;
@@ -71,17 +70,16 @@ impl Stage for BuildInParts<'_> {
 }
 
 impl BuildInParts<'_> {
-    /// Builds the parts that belong to a shard into the cache. Returns their number.
-    pub(super) fn build_shard(&self, shard: Shard, monitor: &dyn Monitor) -> Result<u64> {
+    /// Builds the parts into the cache that belong to a shard, where the first part is this work.
+    /// Returns their number.
+    pub(super) fn build_shard(&self, (shard, first): (Shard, u64), monitor: &dyn Monitor) -> Result<u64> {
         let Parts { ids, whole } = Parts::of(self.mesh.mesh, self.most, monitor)?;
-        let count = ids.len();
-        let mut built = 0;
-        for (number, ids) in ids.iter().enumerate().filter(|(number, _)| shard.has(*number as u64)) {
-            let part = self.part(ids, whole, (number, count));
-            self.cache.run(part, &self.name_of(number), monitor)?;
-            built += 1;
-        }
-        Ok(built)
+        let parts = (0..ids.len()).filter(|number| shard.has(first + *number as u64));
+        let build = |number: usize| {
+            let part = self.part(&ids[number], whole, (number, ids.len()));
+            self.cache.run(part, &self.name_of(number), monitor).map(|_| 1)
+        };
+        parts.map(build).sum()
     }
 
     fn part<'b>(&'b self, ids: &'b [u32], whole: Option<Node>, number: (usize, usize)) -> BuildPart<'b> {
@@ -105,20 +103,10 @@ struct BuildPart<'a> {
 }
 
 /// The wide tree of a part, and the root of its binary tree.
-struct Tree {
-    wide: Wide,
-    root: Node,
-}
-
-/// The reports on a part.
-#[derive(Serialize, Deserialize)]
-struct PartReport {
-    bvh: BvhReport,
-    collapse: CollapseReport,
-}
+type Tree = (Wide, Node);
 
 impl Stage for BuildPart<'_> {
-    type Output = (Tree, PartReport);
+    type Output = (Tree, (BvhReport, CollapseReport));
     const NAME: &'static str = "part";
     const VERSION: &'static str = BuildInParts::VERSION;
 
@@ -130,11 +118,11 @@ impl Stage for BuildPart<'_> {
         let weighed = Weighed { bvh: &tree, probabilities: visits.as_deref() };
         let options = CollapseOptions { whole, ..CollapseOptions::default() };
         let (wide, collapse) = bvh::collapse(mesh.mesh, weighed, &[], &options, monitor)?;
-        Ok((Tree { wide, root: tree.nodes[0] }, PartReport { bvh, collapse }))
+        Ok(((wide, tree.nodes[0]), (bvh, collapse)))
     }
 }
 
-impl CachedStage<Tree, PartReport> for BuildPart<'_> {
+impl CachedStage<Tree, (BvhReport, CollapseReport)> for BuildPart<'_> {
     fn key(&self) -> Key {
         Key::new(Self::NAME)
             .with("geometry", self.mesh.hash())
@@ -151,7 +139,7 @@ impl CachedStage<Tree, PartReport> for BuildPart<'_> {
 
     fn decode(&self, bytes: &[u8]) -> Option<Tree> {
         let tree: Tree = decode(bytes)?;
-        let mut ids = tree.wide.triangle_ids.clone();
+        let mut ids = tree.0.triangle_ids.clone();
         ids.par_sort_unstable();
         (ids == self.ids).then_some(tree)
     }
@@ -159,22 +147,21 @@ impl CachedStage<Tree, PartReport> for BuildPart<'_> {
 
 impl Codec for Tree {
     fn write(&self, to: &mut impl Sink) {
-        let Tree { wide, root: Node { lower, upper, first, count, right } } = self;
-        let Wide { lines, triangle_ids, leaf_vertices, widened_boxes, root, depth } = wide;
+        let (wide, Node { lower, upper, first, count, right }) = self;
+        let Wide { lines, triangle_ids, leaf_vertices: _, widened_boxes, root, depth } = wide;
         to.add(lines);
         to.add(triangle_ids);
-        to.add(leaf_vertices);
         to.add(&[u32::from(*widened_boxes), *root, *depth, *first, *count, *right]);
         to.add(&[*lower, *upper]);
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        let (lines, triangle_ids, leaf_vertices) = (from.take()?, from.take()?, from.take()?);
+        let (lines, triangle_ids) = (from.take()?, from.take()?);
         let [widened_boxes, root, depth, first, count, right] = Codec::read(from)?;
         let [lower, upper] = Codec::read(from)?;
-        let widened_boxes = widened_boxes == 1;
+        let (leaf_vertices, widened_boxes) = (Vec::new(), widened_boxes == 1);
         let wide = Wide { lines, triangle_ids, leaf_vertices, widened_boxes, root, depth };
-        Some(Tree { wide, root: Node { lower, upper, first, count, right } })
+        Some((wide, Node { lower, upper, first, count, right }))
     }
 }
 

@@ -94,7 +94,7 @@ pub(super) fn parts_of(
         let triangles = mesh.take(file, context)?;
         let source = file.full.as_path();
         let compiler = Compiler { source, part: &name, options, cache, clock: &mut *clock, monitor };
-        compiler.parts_of(triangles, hash.into(), shard.from(row))
+        compiler.parts_of(triangles, hash.into(), (shard, row))
     };
     (first..).zip(meshes::read(file, context)?).map(&mut one).collect()
 }

@@ -90,7 +90,7 @@ pub struct Part {
 ///
 /// # Errors
 /// `BTH-L202` and `BTH-L203`, as for [`collapse`](super::collapse()); `BTH-X203` if the lines of a
-/// part are not those of a tree.
+/// part are no tree.
 pub fn join(parts: Vec<Part>) -> Result<(Wide, CollapseReport)> {
     let (mut joined, mut report) = (Wide { root: NONE, ..Wide::default() }, CollapseReport::default());
     let Some(first) = parts.first() else { return Ok((joined, report)) };
@@ -146,7 +146,7 @@ pub fn join(parts: Vec<Part>) -> Result<(Wide, CollapseReport)> {
 }
 
 fn no_tree() -> Error {
-    Error::Internal { code: "BTH-X203", message: "the lines of a part are not those of a tree".to_owned() }
+    Error::Internal { code: "BTH-X203", message: "the lines of a part are no tree".to_owned() }
 }
 
 /// A binary tree whose leaves are parts.
@@ -219,7 +219,7 @@ fn moved(code: u32, lines: usize) -> u32 {
 }
 
 /// Moves the children of all nodes back by a number of lines, and the ids of all leaves by a number
-/// of rows. `None` if the lines are not those of a tree.
+/// of rows. `None` if the lines are no tree.
 fn move_blocks(wide: &mut Wide, lines: usize, rows: usize) -> Option<()> {
     let (mut stack, mut blocks) = (vec![wide.root], 0..wide.lines.len());
     while let Some(code) = stack.pop() {

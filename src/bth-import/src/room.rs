@@ -5,16 +5,16 @@ use crate::error::{Error, Result};
 /// Bytes of memory that a triangle takes until it is compiled, from the reading of its
 /// model on (measured: 162 with `--quality fast`, 219 by default).
 pub const BYTES_PER_TRIANGLE: u64 = 165;
-/// Objects of more triangles are built in parts of at most this number by default. It is a constant,
-/// since bytes of files do not depend on the memory.
+/// Objects of more triangles are built in parts of at most this number by default. It is a
+/// constant, since bytes of files do not depend on the memory.
 pub const TRIANGLES_AT_ONCE: u64 = 1 << 24;
 /// Bytes of memory that each triangle beyond these takes.
 const BYTES_IN_PARTS: u64 = 110;
 /// Models of fewer triangles are not checked.
 const FEW: u64 = 1 << 17;
 
-/// Refuses triangles where there is less memory than they take: `each` bytes for each of the
-/// `at_once` triangles that are built at once, if there are so many.
+/// Refuses triangles where there is less memory than they take: `each` bytes for a triangle that is
+/// built at once with all, or with a part of `at_once` triangles.
 ///
 /// # Errors
 /// `BTH-L034`.

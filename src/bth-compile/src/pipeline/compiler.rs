@@ -106,8 +106,8 @@ impl<'a> Compiler<'a> {
         Compiler { options: &options, ..self }.still(mesh, on_grid, &hash)
     }
 
-    /// Builds those parts of an object into the cache that belong to a shard, where the first part is
-    /// this work. Returns their number; `None` if the object is not built in parts.
+    /// Builds those parts of an object into the cache that belong to a shard, where the first part
+    /// is this work. Returns their number; `None` if the object is not built in parts.
     pub(crate) fn parts_of(
         mut self,
         mesh: Mesh,

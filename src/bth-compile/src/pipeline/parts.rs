@@ -103,10 +103,10 @@ struct BuildPart<'a> {
 }
 
 /// The wide tree of a part, and the root of its binary tree.
-type Tree = (Wide, Node);
+type PartTree = (Wide, Node);
 
 impl Stage for BuildPart<'_> {
-    type Output = (Tree, (BvhReport, CollapseReport));
+    type Output = (PartTree, (BvhReport, CollapseReport));
     const NAME: &'static str = "part";
     const VERSION: &'static str = BuildInParts::VERSION;
 
@@ -122,7 +122,7 @@ impl Stage for BuildPart<'_> {
     }
 }
 
-impl CachedStage<Tree, (BvhReport, CollapseReport)> for BuildPart<'_> {
+impl CachedStage<PartTree, (BvhReport, CollapseReport)> for BuildPart<'_> {
     fn key(&self) -> Key {
         Key::new(Self::NAME)
             .with("geometry", self.mesh.hash())
@@ -133,19 +133,19 @@ impl CachedStage<Tree, (BvhReport, CollapseReport)> for BuildPart<'_> {
             .with("part version", Self::VERSION)
     }
 
-    fn encode(tree: &Tree) -> Vec<u8> {
+    fn encode(tree: &PartTree) -> Vec<u8> {
         encode(tree)
     }
 
-    fn decode(&self, bytes: &[u8]) -> Option<Tree> {
-        let tree: Tree = decode(bytes)?;
+    fn decode(&self, bytes: &[u8]) -> Option<PartTree> {
+        let tree: PartTree = decode(bytes)?;
         let mut ids = tree.0.triangle_ids.clone();
         ids.par_sort_unstable();
         (ids == self.ids).then_some(tree)
     }
 }
 
-impl Codec for Tree {
+impl Codec for PartTree {
     fn write(&self, to: &mut impl Sink) {
         let (wide, Node { lower, upper, first, count, right }) = self;
         let Wide { lines, triangle_ids, leaf_vertices: _, widened_boxes, root, depth } = wide;

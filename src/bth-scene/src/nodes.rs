@@ -213,16 +213,6 @@ impl Nodes {
     }
 }
 
-impl<'a> FromIterator<Node<'a>> for Nodes {
-    fn from_iter<I: IntoIterator<Item = Node<'a>>>(nodes: I) -> Self {
-        let mut all = Self::default();
-        nodes.into_iter().for_each(|node| {
-            all.push(node);
-        });
-        all
-    }
-}
-
 impl fmt::Debug for Nodes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_list().entries(self.iter()).finish()

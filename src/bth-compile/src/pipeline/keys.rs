@@ -38,8 +38,7 @@ pub(super) fn file(source: &SourceDigest, path: &Path, options: &CompileOptions,
 }
 
 /// A compiled scene. `parts` numbers the objects as the manifest does, `sources` identifies the
-/// content of each used one.
-/// `nodes` is a hash of the rows of nodes, which are not in `parts`.
+/// content of each used one, `nodes` is a hash of the rows of nodes, which are not in `parts`.
 pub(crate) fn scene(
     parts: &SceneParts,
     nodes: Digest,

@@ -181,7 +181,7 @@ fn digest(parts: &SceneParts, deformer: &Deformer, nodes: &[Digest]) -> Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bth_scene::{Node, Transform};
+    use bth_scene::{Node, Nodes, Transform};
 
     /// A node "arm" under a node "body", which deforms an object by two targets, with a track of
     /// their weights.
@@ -207,11 +207,12 @@ mod tests {
         assert!(clip_of.is_some());
         let with_node = |at: usize, change: fn(&mut Node<'_>)| {
             clip(|m| {
-                let changed = m.nodes.iter().enumerate().map(|(row, mut node)| {
+                let mut changed = Nodes::default();
+                for (row, mut node) in m.nodes.iter().enumerate() {
                     (row == at).then(|| change(&mut node));
-                    node
-                });
-                m.nodes = changed.collect();
+                    changed.push(node);
+                }
+                m.nodes = changed;
             })
         };
         let moved: fn(&mut Node<'_>) = |node| {

@@ -127,7 +127,7 @@ pub(super) fn encode(
     take(&nodes)?;
     let rows =
         order.iter().map(|&node| (manifest.nodes.parent(node).map(|parent| row_of[parent]), is_group(node)));
-    let groups = groups.is_some().then(|| Groups::of_rows(rows)).flatten();
+    let groups = Groups::of_rows(rows);
     number_instances(groups.as_ref(), &mut parts.instances);
     add_tracks(&mut parts, manifest, &row_of);
     add_cameras(&mut parts, &mut names, manifest, &row_of);

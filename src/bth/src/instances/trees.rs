@@ -42,8 +42,8 @@ impl Trees {
 
 impl World {
     /// Checks that the visible instances of a file can be placed at the first frame of its scene.
-    /// Returns the trees that the file may hold. Rows have the boxes of whole
-    /// objects.
+    /// Returns the trees that the file may hold. The boxes of
+    /// rows hold whole objects.
     ///
     /// # Errors
     /// The errors of [`Self::new`].

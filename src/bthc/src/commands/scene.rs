@@ -83,7 +83,7 @@ pub(super) fn compile(
 /// Fails without a cache, where the work of a shard would be lost.
 pub(super) fn check_store(context: &JobContext<'_>) -> Result<(), Failure> {
     let usage = Failure::Usage {
-        message: "--shard keeps objects and their parts in the cache, and there is none".to_owned(),
+        message: "--shard keeps objects and their parts in the cache, and no cache is in use".to_owned(),
         hint: "leave --no-cache and BTH_NO_CACHE out, and name a folder with --cache-dir or BTH_CACHE_DIR",
     };
     if context.store.is_some() { Ok(()) } else { Err(usage) }

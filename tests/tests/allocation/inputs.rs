@@ -93,6 +93,21 @@ fn liars() -> Vec<(&'static str, Vec<u8>)> {
     liars
 }
 
+/// A scene may have many millions of nodes, so no list of them has many bytes for each.
+#[test]
+fn nodes_of_a_manifest_take_few_bytes() {
+    const NODES: usize = 50_000;
+    let node =
+        |i: usize| format!("[[nodes]]\nname = \"n{i}\"\nobject = \"a\"\ntranslation = [{i}, 0.5, 1]\n");
+    let objects = "version = 1\n[[objects]]\nname = \"a\"\nmodel = \"a.ply\"\n".to_owned();
+    let text = objects + &(0..NODES).map(node).collect::<String>();
+    let most = largest(|| {
+        let manifest = bth_scene::parse(&text, Path::new("a.manifest")).expect("a manifest");
+        assert_eq!(manifest.nodes.get(NODES - 1).object, Some(0));
+    });
+    assert!(most <= 64 * NODES, "{most} bytes for {NODES} nodes");
+}
+
 #[test]
 fn sources_that_announce_more_than_they_hold_allocate_little() {
     for (name, bytes) in liars() {

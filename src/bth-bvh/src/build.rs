@@ -22,12 +22,11 @@ pub enum Quality {
     /// Binned SAH with 16 bins.
     Fast,
     /// Binned SAH with 32 bins, full sweep in small nodes, two passes of reinsertion of the largest
-    /// nodes, three rounds in which treelets are rebuilt; the wide nodes are chosen by what sample
-    /// rays enter.
+    /// nodes; the wide nodes are chosen by what sample rays enter.
     #[default]
     Balanced,
     /// Full-sweep SAH except in the topmost nodes, where 32 bins give trees as good; three passes
-    /// of reinsertion, five rounds of treelets.
+    /// of reinsertion.
     Best,
 }
 
@@ -41,20 +40,17 @@ pub struct Effort {
     /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short
     /// passes reduce the cost more than a long one (measured on rooms and a car).
     pub reinsertion: Vec<f64>,
-    /// Rounds in which treelets are rebuilt ([`rebuild_treelets`](super::rebuild_treelets)); with
-    /// none the wide tree is chosen by areas alone, unless rays are known.
-    pub treelets: usize,
 }
 
 impl Quality {
     /// The parameters of this quality.
     pub fn effort(self) -> Effort {
-        let (bins, sweep_count, reinsertion, treelets): (_, _, &[f64], _) = match self {
-            Quality::Fast => (16, 8, &[], 0),
-            Quality::Balanced => (32, 64, &[0.05, 0.1], 3),
-            Quality::Best => (32, 1 << 14, &[0.1, 0.5, 0.5], 5),
+        let (bins, sweep_count, reinsertion): (_, _, &[f64]) = match self {
+            Quality::Fast => (16, 8, &[]),
+            Quality::Balanced => (32, 64, &[0.05, 0.1]),
+            Quality::Best => (32, 1 << 14, &[0.1, 0.5, 0.5]),
         };
-        Effort { bins, sweep_count, reinsertion: reinsertion.to_vec(), treelets }
+        Effort { bins, sweep_count, reinsertion: reinsertion.to_vec() }
     }
 }
 
@@ -81,19 +77,16 @@ pub struct BvhReport {
     pub levels: u32,
     /// Nodes that a random line through the root's box enters, on average: the sum of the nodes'
     /// areas over the root's. One value after the top-down build, one after each pass of
-    /// reinsertion, and the last after treelets were rebuilt, which lowers the cost of the wide
-    /// tree and may raise this.
+    /// reinsertion.
     pub visits: Vec<f64>,
     /// Subtrees that each pass of reinsertion moved.
     pub moved: Vec<u64>,
-    /// Treelets that each round rebuilt.
-    pub treelets: Vec<u64>,
 }
 
 impl BvhReport {
     fn measure(&mut self, bvh: &BinaryBvh) {
         self.nodes = bvh.nodes.len() as u64;
-        self.levels = levels(bvh);
+        self.levels = levels_below(bvh, 0);
     }
 
     /// Adds the report on a part of a mesh, where rays enter the box of this share of the area.
@@ -103,7 +96,6 @@ impl BvhReport {
         self.levels = self.levels.max(part.levels);
         sum_up(&mut self.visits, part.visits.iter().map(|visits| visits * share));
         sum_up(&mut self.moved, part.moved.iter().copied());
-        sum_up(&mut self.treelets, part.treelets.iter().copied());
     }
 }
 
@@ -199,19 +191,10 @@ pub(super) fn split_all<E: Extent>(
     monitor: &dyn Monitor,
 ) -> Result<BinaryBvh> {
     monitor.stage("build", Some(references.len() as u64));
-    split_with(&mut references, effort, &mut sweep_split::Scratch::default(), monitor)
-}
-
-/// Does the work of [`split_all`] within another stage.
-pub(super) fn split_with<E: Extent>(
-    references: &mut [Reference<E>],
-    effort: &Effort,
-    scratch: &mut sweep_split::Scratch<E>,
-    monitor: &dyn Monitor,
-) -> Result<BinaryBvh> {
     let mut nodes = super::zeroed(2 * references.len() - 1);
+    let mut scratch = sweep_split::Scratch::default();
     let builder = Builder { effort, monitor };
-    builder.subtree(references, None, &mut nodes, Destination::ROOT, scratch)?;
+    builder.subtree(&mut references, None, &mut nodes, Destination::ROOT, &mut scratch)?;
     Ok(BinaryBvh { nodes, order: references.iter().map(|r| r.id).collect() })
 }
 
@@ -380,16 +363,11 @@ fn split_by_id<E: Extent>(references: &mut [Reference<E>]) -> usize {
 }
 
 /// Nodes that a random line through the root's box enters on average; see [`BvhReport::visits`].
-pub(super) fn visits(bvh: &BinaryBvh) -> f64 {
+fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     let root = area(&bvh.nodes[0]);
     // A deformable mesh may lie on one line.
     if root > 0.0 { super::sum(bvh.nodes.len(), |at| area(&bvh.nodes[at as usize])) / root } else { 0.0 }
-}
-
-/// Edges on the longest path.
-pub(super) fn levels(bvh: &BinaryBvh) -> u32 {
-    levels_below(bvh, 0)
 }
 
 /// Edges on the longest path from a node.

@@ -1,8 +1,7 @@
 //! The binary BVH, input of the stages marks, costs and tets, and its collapse to the wide BVH.
 //!
 //! [`build()`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of
-//! lower cost. [`rebuild_treelets()`] rebuilds small parts of the tree where the wide tree then
-//! costs less. [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
+//! lower cost. [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
 //!
 //! [`Parts`] splits a mesh that is too large to be built at once. [`join()`] joins the wide trees
 //! of its parts.
@@ -33,7 +32,6 @@ pub mod sampling;
 mod slot_order;
 mod split;
 mod sweep_split;
-mod treelets;
 pub mod vectors;
 mod wide;
 mod wide_lines;
@@ -46,7 +44,6 @@ pub mod testing;
 #[cfg(test)]
 mod validate;
 
-use build::visits;
 pub use build::{BvhOptions, BvhReport, Effort, Quality, build, build_part};
 pub use build_poses::{PoseOptions, build_poses};
 pub use collapse::{CollapseOptions, collapse};
@@ -54,7 +51,6 @@ pub use parts::{Part, Parts, join};
 pub use places::triangle_places;
 pub use plan::Costs;
 pub use poses::{Poses, Weighed};
-pub use treelets::rebuild_treelets;
 pub use wide::{CollapseReport, Wide};
 
 use bounds::Bounds;

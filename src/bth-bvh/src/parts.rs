@@ -2,11 +2,11 @@
 //! space into parts. Their trees are built one after the other, and joined under one.
 
 use super::bounds::Bounds;
-use super::build::{Effort, check_mesh, split_with};
+use super::build::{check_mesh, split_all};
 use super::split::Reference;
 use super::wide_lines::{put, wide_node};
 use super::wide_tree::check_lines;
-use super::{BinaryBvh, CollapseReport, Node, Wide, sweep_split, zeroed};
+use super::{BinaryBvh, CollapseReport, Node, Wide, zeroed};
 use bth_format::layout::{CacheLine, Child, IndexedLeaf, NODE_LINES, NONE, RawLeaf, WIDTH, WideNode};
 use bth_import::Mesh;
 use bth_import::error::{Error, Result};
@@ -153,9 +153,8 @@ fn no_tree() -> Error {
 fn over_parts(parts: &[Part]) -> Result<BinaryBvh> {
     let reference =
         |(id, part): (usize, &Part)| Reference { bounds: Bounds::of_node(&part.root), id: id as u32 };
-    let mut references: Vec<Reference<Bounds>> = parts.iter().enumerate().map(reference).collect();
-    let effort: Effort = super::Quality::Best.effort();
-    split_with(&mut references, &effort, &mut sweep_split::Scratch::default(), &Silent)
+    let references: Vec<Reference<Bounds>> = parts.iter().enumerate().map(reference).collect();
+    split_all(references, &super::Quality::Best.effort(), &Silent)
 }
 
 /// A wide node over parts.

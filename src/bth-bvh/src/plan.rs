@@ -62,7 +62,7 @@ impl Decision {
     }
 
     /// Sets how many of `slots` slots the left child takes.
-    pub(super) fn set_share(&mut self, slots: usize, left: usize) {
+    fn set_share(&mut self, slots: usize, left: usize) {
         self.0 |= (left as u64) << (4 * (slots % WIDTH));
     }
 
@@ -140,13 +140,12 @@ impl Vertices {
 }
 
 /// Input of the planning.
-#[derive(Clone, Copy)]
 pub(super) struct Planner<'a> {
-    pub(super) mesh: &'a Mesh,
+    mesh: &'a Mesh,
     /// Binary BVH of at least one node.
-    pub(super) bvh: &'a BinaryBvh,
+    bvh: &'a BinaryBvh,
     pub(super) costs: Costs,
-    pub(super) monitor: &'a dyn Monitor,
+    monitor: &'a dyn Monitor,
     weighed: Weighed<'a>,
     inverse_area: f64,
     /// Price of a line.
@@ -177,15 +176,8 @@ impl<'a> Planner<'a> {
     }
 
     /// Probability that a ray through the root enters the node.
-    pub(super) fn area(&self, at: u32) -> f32 {
+    fn area(&self, at: u32) -> f32 {
         (self.weighed.area(at) * self.inverse_area) as f32
-    }
-
-    /// The smallest cost of a small BVH of some triangles of the mesh as one child of a wide node.
-    /// Probabilities are areas times `scale`.
-    pub(super) fn cost_of_part(&self, part: &BinaryBvh, scale: f64) -> Result<f32> {
-        let planner = Planner { bvh: part, weighed: part.into(), inverse_area: scale, ..*self };
-        Ok(planner.subtree(0, &[], &mut vec![Decision::default(); part.nodes.len()])?.cost[1])
     }
 
     fn subtree(&self, at: u32, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
@@ -260,15 +252,15 @@ impl<'a> Planner<'a> {
 
 /// The smallest costs of the two subtrees of a node in 1 to 15 slots each, and the numbers of their
 /// leaves, in more slots than which they cost no less.
-pub(super) struct Pair<'a> {
-    pub(super) costs: [&'a [f32; WIDTH]; 2],
-    pub(super) leaves: [usize; 2],
+struct Pair<'a> {
+    costs: [&'a [f32; WIDTH]; 2],
+    leaves: [usize; 2],
 }
 
 impl Pair<'_> {
     /// The smallest cost of both in `slots` slots, and how many of these the left one takes.
     #[inline(always)]
-    pub(super) fn distribute(&self, slots: usize) -> (f32, usize) {
+    fn distribute(&self, slots: usize) -> (f32, usize) {
         let [left, right] = self.leaves;
         let first = slots.saturating_sub(right).max(1).min(left);
         let mut best = (f32::INFINITY, first);
@@ -283,7 +275,7 @@ impl Pair<'_> {
 
     /// Decides how a node whose cost in one slot is known shares more slots between its children.
     #[inline(always)]
-    pub(super) fn in_several_slots(&self, decision: &mut Decision, cost: &mut [f32; WIDTH]) {
+    fn in_several_slots(&self, decision: &mut Decision, cost: &mut [f32; WIDTH]) {
         let leaves = self.leaves[0] + self.leaves[1];
         for slots in 2..WIDTH.min(leaves + 1) {
             let (shared, share) = self.distribute(slots);

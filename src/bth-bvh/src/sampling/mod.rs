@@ -12,6 +12,3 @@ pub use known::KnownRays;
 pub use rays::{SampleRay, along, from_surface, outside, within};
 pub use visits::visits;
 pub use walk::{Traced, affordable, crosses, walk};
-
-#[cfg(test)]
-pub(crate) use visits::entered;

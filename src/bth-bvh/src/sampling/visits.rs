@@ -65,7 +65,7 @@ fn sample(mesh: &Mesh, bvh: &BinaryBvh, known: usize) -> Vec<SampleRay> {
 }
 
 /// For each node the number of rays that enter it before they end or are stopped.
-pub(crate) fn entered(mesh: &Mesh, bvh: &BinaryBvh, rays: &[SampleRay]) -> Vec<u32> {
+fn entered(mesh: &Mesh, bvh: &BinaryBvh, rays: &[SampleRay]) -> Vec<u32> {
     let counts: Vec<AtomicU32> = (0..bvh.nodes.len()).into_par_iter().map(|_| AtomicU32::new(0)).collect();
     rays.par_iter().for_each_init(Vec::new, |stack, ray| {
         let hit = walk(mesh, bvh, ray, |_| ()).hit;

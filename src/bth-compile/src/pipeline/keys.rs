@@ -25,7 +25,7 @@ use bth_import::TRIANGLES_AT_ONCE;
 use std::path::Path;
 
 /// Version of compiled files.
-const FILE: &str = "7";
+const FILE: &str = "8";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = BuildPoses::VERSION;
 

@@ -31,7 +31,6 @@ pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cach
 pub use direct::{compile_fast, compile_model_fast, fast_model};
 pub use object::Compiled;
 pub use report::{CompileReport, FileReport, MotionReport};
-pub use tree::build_tree;
 
 pub(crate) use compile::{compile_or_fetch, tetgen_in_keys};
 pub(crate) use compiler::Compiler;

@@ -4,7 +4,7 @@
 
 use super::hashed::Hashed;
 use super::object::{Collapse, Hierarchy};
-use super::tree::{BuildTree, CountVisits, TreeOptions, rebuilt};
+use super::tree::{BuildTree, CountVisits, TreeOptions};
 use crate::bvh::{self, BvhReport, CollapseOptions, CollapseReport, Node, Part, Parts, Weighed, Wide};
 use crate::cached::{Cache, Codec, RowReader, Sink, decode, encode, text};
 use crate::error::Result;
@@ -48,7 +48,7 @@ pub(crate) fn may_be_in_parts(model: &Path, options: &CompileOptions) -> bool {
 impl Stage for BuildInParts<'_> {
     type Output = (Hierarchy, BvhReport, CollapseReport);
     const NAME: &'static str = "parts";
-    const VERSION: &'static str = "1";
+    const VERSION: &'static str = "2";
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         let Parts { ids, whole } = Parts::of(self.mesh.mesh, self.most, monitor)?;
@@ -112,8 +112,7 @@ impl Stage for BuildPart<'_> {
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         let Self { mesh, options, ids, whole, .. } = self;
-        let built = bvh::build_part(mesh.mesh, ids, options.bvh.quality, monitor)?;
-        let (tree, bvh) = rebuilt(mesh.mesh, built, &options, monitor)?;
+        let (tree, bvh) = bvh::build_part(mesh.mesh, ids, options.bvh.quality, monitor)?;
         let visits = CountVisits { built: BuildTree { mesh, options }, tree: &tree }.run(monitor)?;
         let weighed = Weighed { bvh: &tree, probabilities: visits.as_deref() };
         let options = CollapseOptions { whole, ..CollapseOptions::default() };

@@ -2,7 +2,7 @@
 //! Both follow sample rays where the quality says so, and the rays that are known.
 
 use super::hashed::Hashed;
-use crate::bvh::{self, BinaryBvh, BvhOptions, BvhReport};
+use crate::bvh::{self, BinaryBvh, BvhOptions, BvhReport, Quality};
 use crate::cached::{Topology, decode, encode, text};
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -10,7 +10,6 @@ use crate::options::CompileOptions;
 use crate::sampling::{self, KnownRays};
 use crate::stage::{CachedStage, Stage};
 use bth_cache::Key;
-use bth_import::Mesh;
 
 /// What the tree of a mesh depends on besides the mesh.
 #[derive(Clone, Copy, Debug)]
@@ -29,13 +28,13 @@ impl<'a> TreeOptions<'a> {
         Self { bvh, rays: options.costs.rays.as_deref().filter(|_| !options.deformable) }
     }
 
-    /// Rounds of treelets.
-    fn rounds(&self) -> usize {
-        if self.bvh.keep_zero_area { 0 } else { self.bvh.quality.effort().treelets }
+    /// Returns true if the wide nodes are chosen by what rays enter.
+    fn by_rays(&self) -> bool {
+        self.rays.is_some() || (self.bvh.quality != Quality::Fast && !self.bvh.keep_zero_area)
     }
 }
 
-/// Builds the tree and rebuilds its treelets.
+/// Builds the tree.
 #[derive(Clone, Copy)]
 pub(crate) struct BuildTree<'a> {
     pub(crate) mesh: Hashed<'a>,
@@ -45,21 +44,20 @@ pub(crate) struct BuildTree<'a> {
 impl Stage for BuildTree<'_> {
     type Output = (BinaryBvh, BvhReport);
     const NAME: &'static str = "bvh";
-    const VERSION: &'static str = "3";
+    const VERSION: &'static str = "4";
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
-        build(self.mesh.mesh, &self.options, monitor)
+        bvh::build(self.mesh.mesh, &self.options.bvh, monitor)
     }
 }
 
 impl CachedStage<BinaryBvh, BvhReport> for BuildTree<'_> {
     fn key(&self) -> Key {
-        let TreeOptions { bvh: BvhOptions { quality, keep_zero_area }, rays } = self.options;
+        let BvhOptions { quality, keep_zero_area } = self.options.bvh;
         Key::new(Self::NAME)
             .with("geometry", self.mesh.hash())
             .with("quality", text(&quality))
             .with("zero area kept", keep_zero_area.to_string())
-            .with("rays", rays.map_or_else(String::new, KnownRays::hash))
             .with("bvh version", Self::VERSION)
     }
 
@@ -70,34 +68,6 @@ impl CachedStage<BinaryBvh, BvhReport> for BuildTree<'_> {
     fn decode(&self, bytes: &[u8]) -> Option<BinaryBvh> {
         decode::<Topology>(bytes)?.over(self.mesh.mesh)
     }
-}
-
-fn build(mesh: &Mesh, options: &TreeOptions<'_>, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
-    rebuilt(mesh, bvh::build(mesh, &options.bvh, monitor)?, options, monitor)
-}
-
-/// A tree after its treelets were rebuilt.
-pub(super) fn rebuilt(
-    mesh: &Mesh,
-    (tree, mut report): (BinaryBvh, BvhReport),
-    options: &TreeOptions<'_>,
-    monitor: &dyn Monitor,
-) -> Result<(BinaryBvh, BvhReport)> {
-    let visits = |tree: &BinaryBvh| sampling::visits(mesh, tree, options.rays);
-    let tree = bvh::rebuild_treelets(mesh, tree, options.rounds(), &visits, &mut report, monitor)?;
-    Ok((tree, report))
-}
-
-/// The tree by which a mesh is compiled with these options.
-///
-/// # Errors
-/// The errors of [`bvh::build`].
-pub fn build_tree(
-    mesh: &Mesh,
-    options: &CompileOptions,
-    monitor: &dyn Monitor,
-) -> Result<(BinaryBvh, BvhReport)> {
-    build(mesh, &TreeOptions::of(options), monitor)
 }
 
 /// Finds for each node of a tree the probability that a ray enters it; `None` where the node's area
@@ -114,7 +84,6 @@ impl Stage for CountVisits<'_> {
 
     fn run(self, _: &dyn Monitor) -> Result<Self::Output> {
         let Self { built: BuildTree { mesh, options }, tree } = self;
-        let by_rays = options.rounds() > 0 || options.rays.is_some();
-        Ok(by_rays.then(|| sampling::visits(mesh.mesh, tree, options.rays)))
+        Ok(options.by_rays().then(|| sampling::visits(mesh.mesh, tree, options.rays)))
     }
 }

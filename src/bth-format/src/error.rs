@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// What opening and checking return.
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// The section that an error is about. Specification: "Kinds".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

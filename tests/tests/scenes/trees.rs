@@ -5,7 +5,7 @@ use crate::support::{manifest, models, options};
 use bth::rays::{Hit, Ray};
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::{Silent, scene};
-use bth_format::layout::kind;
+use bth_format::layout::{Node, kind};
 use bth_random::Rng;
 use std::fmt::Write;
 use std::path::Path;
@@ -162,6 +162,26 @@ fn objects_of_scenes_with_trees_take_new_positions() {
         }
         assert_same(&mapped, &read, &mut Rng::new(3));
     }
+}
+
+/// A mapped file's transforms have not been checked.
+#[test]
+fn the_row_that_cannot_be_placed_is_named() {
+    let options = CompileOptions { deformable: true, ..options() };
+    let (_, read, folder) = opened(&format!("{OBJECTS}{}", nodes(4000, "")), &options);
+    let row = (1000..).find(|row| read.instance(*row).visible).unwrap();
+    let mut bytes = read.file().bytes().to_vec();
+    let nodes = read.file().sections().find(|section| section.entry.kind == kind::NODES).unwrap();
+    let node = nodes.entry.offset as usize + read.instance(row).node as usize * size_of::<Node>();
+    bytes[node..][..size_of::<f64>()].copy_from_slice(&f64::MAX.to_le_bytes());
+    let path = folder.path().join("far.bth");
+    std::fs::write(&path, bytes).unwrap();
+    // SAFETY: nobody else knows the folder, in which the file is not changed.
+    #[allow(unsafe_code)]
+    let mut mapped = unsafe { bth::map(&path) }.unwrap();
+    let positions = mapped.positions(0).to_vec();
+    let error = mapped.set_positions(0, &positions).unwrap_err();
+    assert!(error.to_string().contains(&format!("instance {row}")), "{error}");
 }
 
 #[test]

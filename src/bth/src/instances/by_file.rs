@@ -2,7 +2,7 @@
 
 use super::group_row::object_of_group;
 use super::groups::{self, RowPlace};
-use super::placement::{PlacementError, RowBox, Unplaceable};
+use super::placement::{RowBox, Unplaceable};
 use super::stored::StoredRows;
 use super::top_level::TopLevel;
 use super::world::{InstanceRow, NewInstance, TransformSource, World, scene_of};
@@ -31,7 +31,9 @@ impl World {
         let Some(file) = objects.sole_file() else { return Ok(None) };
         let Some(view) = file.check_scene()? else { return Ok(None) };
         let scene = &view.scene[0];
-        World::placed_at(objects, &view, f64::from(scene.first_frame) / scene.rate).map(Some)
+        let seconds = f64::from(scene.first_frame) / scene.rate;
+        let world = World::placed_at(objects, &view, seconds);
+        world.map(Some).map_err(|failed| unplaceable(objects, seconds, failed))
     }
 
     /// Like [`Self::new`], with the trees of the file, and without checking anything in the scene
@@ -75,7 +77,8 @@ impl World {
             world.top = TopLevel::stored(file, tree);
         }
         world.evaluate_nodes(objects, seconds, true);
-        world.place_moved(objects, seconds, &[], true)?;
+        let placed = world.place_moved(objects, &[], true);
+        placed.map_err(|failed| unplaceable(objects, seconds, failed))?;
         Ok(Some(world))
     }
 
@@ -83,30 +86,21 @@ impl World {
     ///
     /// # Errors
     /// The first row that cannot be placed.
-    pub(super) fn place_stored(&mut self, objects: &Objects) -> std::result::Result<(), Unplaceable> {
+    pub(super) fn place_stored(&mut self, objects: &Objects) -> Result<(), Unplaceable> {
         if self.stored.is_none() {
             return Ok(());
         }
-        let traced = std::mem::take(&mut self.traced);
-        let placed = World::placed_at(objects, &scene_of(objects), self.seconds);
-        match placed {
-            Ok(mut world) => {
-                world.traced = traced;
-                *self = world;
-            }
-            Err(_) => {
-                self.traced = traced;
-                return Err(Unplaceable { instance: 0, error: PlacementError::NotFinite });
-            }
-        }
+        let mut placed = World::placed_at(objects, &scene_of(objects), self.seconds)?;
+        placed.traced = std::mem::take(&mut self.traced);
+        *self = placed;
         Ok(())
     }
 
     /// The instances of a file at a time. Its scene has been checked.
     ///
     /// # Errors
-    /// Errors of [`Self::update`].
-    fn placed_at(objects: &Objects, view: &SceneView<'_>, seconds: f64) -> Result<World> {
+    /// The first instance that cannot be placed.
+    fn placed_at(objects: &Objects, view: &SceneView<'_>, seconds: f64) -> Result<World, Unplaceable> {
         let file = objects.sole_file().expect("a file with a scene");
         let source = TransformSource::File(NodeHierarchy::new(view, 0));
         let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
@@ -122,7 +116,7 @@ impl World {
         }
         world.animation.add(file, 0);
         world.evaluate_nodes(objects, seconds, true);
-        world.place_moved(objects, seconds, &[], true)?;
+        world.place_moved(objects, &[], true)?;
         Ok(world)
     }
 
@@ -147,9 +141,10 @@ impl World {
         for first in (0..count).step_by(CHUNK) {
             let rows = (first..count.min(first + CHUNK as u32)).collect::<Vec<_>>();
             world.place_all(objects, &rows, &new, &mut placed);
-            for (row, placed) in rows.into_iter().zip(&placed) {
-                let placed = placed.map_err(|error| unplaceable(objects, seconds, row, error))?;
-                boxes.extend(placed.map(|placed| (row, placed.row_box())));
+            for (instance, placed) in rows.into_iter().zip(&placed) {
+                let failed = |error| unplaceable(objects, seconds, Unplaceable { instance, error });
+                let placed = placed.map_err(failed)?;
+                boxes.extend(placed.map(|placed| (instance, placed.row_box())));
             }
         }
         Ok(boxes)
@@ -200,7 +195,7 @@ impl World {
             // succeeds.
             Err(_) => {
                 self.evaluate_nodes(objects, self.seconds, true);
-                drop(self.place_moved(objects, self.seconds, &[], true));
+                let _ = self.place_moved(objects, &[], true);
             }
         }
         result
@@ -220,12 +215,12 @@ impl World {
             None => StagedPoses::default(),
         };
         let refitted = objects.refit(&staged.objects, start);
-        let update = match self.place_moved(objects, seconds, &staged.objects, false) {
+        let update = match self.place_moved(objects, &staged.objects, false) {
             Ok(update) => update,
-            Err(error) => {
+            Err(failed) => {
                 self.forget_parts(&staged.objects);
                 objects.undo_refit(&staged.objects);
-                return Err(error);
+                return Err(unplaceable(objects, seconds, failed));
             }
         };
         self.animation.keep(staged);
@@ -242,19 +237,15 @@ impl World {
 
     /// Places the instances that moved and the instances of objects that deformed, or with `all`
     /// every instance, and rebuilds the top level.
-    fn place_moved(
-        &mut self,
-        objects: &Objects,
-        seconds: f64,
-        deformed: &[u32],
-        all: bool,
-    ) -> Result<Update> {
+    ///
+    /// # Errors
+    /// The first instance that cannot be placed.
+    fn place_moved(&mut self, objects: &Objects, deformed: &[u32], all: bool) -> Result<Update, Unplaceable> {
         self.forget_parts(deformed);
         let view = scene_of(objects);
         let mut deforms = vec![false; if deformed.is_empty() { 0 } else { objects.count() as usize }];
         deformed.iter().for_each(|object| deforms[*object as usize] = true);
         let mut update = Update::default();
-        let failed = |row: u32, error: PlacementError| unplaceable(objects, seconds, row, error);
         let is_skinned =
             |world: &World, of: &Instance| of.group().is_none() && world.animation.is_skinned(of.object);
         let hides = |hierarchy: &NodeHierarchy, of: &Instance, skinned: bool| match skinned {
@@ -294,8 +285,9 @@ impl World {
                 Some(_) => moved.iter().map(|row| new(*row)).collect(),
                 None => Vec::new(),
             };
-            for (row, placed) in moved.iter().zip(&placed) {
-                self.placements[(*row - first_row) as usize] = placed.map_err(|error| failed(*row, error))?;
+            for (&instance, placed) in moved.iter().zip(&placed) {
+                let placement = placed.map_err(|error| Unplaceable { instance, error })?;
+                self.placements[(instance - first_row) as usize] = placement;
             }
             if let Some(groups) = self.groups_mut() {
                 for (row, NewInstance { row: InstanceRow { to_world, .. }, visible }) in
@@ -307,8 +299,7 @@ impl World {
             update.placed += moved.len();
         }
         if update.placed > 0 {
-            let groups = self.update_groups(objects, std::iter::empty());
-            groups.map_err(|at| failed(at.instance, at.error))?;
+            self.update_groups(objects, std::iter::empty())?;
             self.update_top(false, &mut update);
         }
         update.visible = self.visible();
@@ -327,10 +318,10 @@ impl World {
     }
 }
 
-/// The error for a row that cannot be placed.
-fn unplaceable(objects: &Objects, seconds: f64, row: u32, error: PlacementError) -> Error {
-    let (view, (code, expected, found)) = (scene_of(objects), error.words());
-    let node = view.instances[row as usize].node;
+/// The error for an instance that cannot be placed at a time.
+fn unplaceable(objects: &Objects, seconds: f64, failed: Unplaceable) -> Error {
+    let (view, (code, expected, found)) = (scene_of(objects), failed.error.words());
+    let node = view.instances[failed.instance as usize].node;
     let found = format!("{found}: node \"{}\" at {seconds} s", view.node_name(node).escape_debug());
     let offset = u64::from(node) * size_of::<Node>() as u64;
     let error = Error::within_file(code, kind::NODES, offset, expected, found);

@@ -384,6 +384,23 @@ def test_points_that_move():
     assert scene.triangle_counts.tolist() == [12] and np.abs(corners(scene)).max() == 1
 
 
+def test_colors_stay_with_points_that_move():
+    stage = Usd.Stage.CreateInMemory()
+    stage.SetStartTimeCode(0)
+    stage.SetEndTimeCode(2)
+    mesh = cube(stage, "/soft")
+    for frame in (0, 2):
+        mesh.GetPointsAttr().Set(Vt.Vec3fArray.FromNumpy((CUBE * [1, 1 + frame, 1]).astype(np.float32)), frame)
+    colors = mesh.CreateDisplayColorPrimvar("vertex")
+    colors.Set(Vt.Vec3fArray.FromNumpy(((CUBE + 1) / 2).astype(np.float32)))
+    scene = compiled(stage, materials=True)
+    for frame in (0, 1, 2):
+        scene.set_frame(frame)
+        hits = scene.nearest([[0.5, 9, 0.25], [-0.75, 9, -0.5]], [0, -1, 0])
+        np.testing.assert_allclose(9 - hits.t, 1 + frame)
+        np.testing.assert_allclose(hits.vertex_color, [[0.75, 1, 0.625, 1], [0.125, 1, 0.25, 1]], atol=1e-6)
+
+
 def test_what_usd_cannot_open_is_refused_with_its_place(tmp_path):
     (tmp_path / "a.usda").write_text('#usda 1.0\n\ndef Mesh "a" {\n    point3f[] points = [(0, 0]\n}\n')
     with pytest.raises(ValueError, match=r"a\.usda: USD cannot open it: .*a\.usda:4:"):

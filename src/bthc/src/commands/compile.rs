@@ -140,7 +140,9 @@ fn check_outputs(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> 
     if there.is_empty() {
         return Ok(());
     }
-    for job in jobs {
+    // A manifest alone is compared when it is compiled, so that it is read once.
+    let is_compared_later = |job: &Job| jobs.len() == 1 && scene::is_manifest(&job.model);
+    for job in jobs.iter().filter(|job| !is_compared_later(job)) {
         // A source that cannot be read is reported when it is compiled.
         let inputs = depfile::inputs(context, job).unwrap_or_else(|_| vec![job.model.clone()]);
         there.check(&inputs)?;

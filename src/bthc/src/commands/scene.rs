@@ -3,8 +3,9 @@
 use super::deliver::deliver;
 use super::job::{self, Job, JobContext, JobReport, Target};
 use super::summary::{stages, worker_note};
-use crate::args::{Compile, Gltf};
+use crate::args::Compile;
 use crate::failure::Failure;
+use crate::overwrite::Outputs;
 use crate::table::{Table, bytes, count};
 use bth_compile::Monitor;
 use bth_compile::cached::Cache;
@@ -26,7 +27,8 @@ fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     path.extension().is_some_and(|e| extensions.iter().any(|wanted| e.eq_ignore_ascii_case(wanted)))
 }
 
-fn is_manifest(path: &Path) -> bool {
+/// Returns true if a path has the extension of manifests.
+pub(super) fn is_manifest(path: &Path) -> bool {
     has_extension(path, &["manifest", "toml"])
 }
 
@@ -35,17 +37,28 @@ pub(super) fn folder(scene: &Path) -> &Path {
     scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Reads a manifest, or makes one from another file.
+/// Reads the manifest of a job, or makes one from another file.
+///
+/// # Errors
+/// When it cannot be read, or names a file that an output would replace.
 fn read(
-    model: &Path,
-    gltf: &Gltf,
+    context: &JobContext<'_>,
+    job: &Job,
     monitor: &dyn Monitor,
 ) -> Result<(Manifest, Option<ImportReport>), Failure> {
-    if is_manifest(model) {
-        return Ok((bth_scene::read(model)?, None));
+    let (model, Compile { gltf, jobs, .. }) = (&job.model, context.args);
+    if !is_manifest(model) {
+        let (manifest, report) = import(model, file_name(model)?, &gltf.options(), monitor)?;
+        return Ok((manifest, Some(report)));
     }
-    let (manifest, report) = import(model, file_name(model)?, &gltf.options(), monitor)?;
-    Ok((manifest, Some(report)))
+    let manifest = bth_scene::read(model)?;
+    let there = Outputs::new(job.target.path().into_iter().chain(jobs.depfile.as_deref()));
+    if !there.is_empty() {
+        // A model that cannot be read is reported when it is compiled.
+        let inputs = files(&manifest, model, context.options.looks());
+        there.check(inputs.unwrap_or_else(|_| vec![model.clone()]))?;
+    }
+    Ok((manifest, None))
 }
 
 /// Compiles a scene.
@@ -54,7 +67,7 @@ pub(super) fn compile(
     job: &Job,
     monitor: &dyn Monitor,
 ) -> Result<JobReport, Failure> {
-    let (manifest, import) = read(&job.model, &context.args.gltf, monitor)?;
+    let (manifest, import) = read(context, job, monitor)?;
     let cache = job::cache(context, job);
     let source = SceneSource { folder: folder(&job.model), name: &job.model };
     if let Some(shard) = context.shard {
@@ -115,7 +128,7 @@ pub(super) fn dry_run(
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<DryRun, Failure> {
-    let (manifest, _) = read(&job.model, &context.args.gltf, monitor)?;
+    let (manifest, _) = read(context, job, monitor)?;
     let source = SceneSource { folder: folder(&job.model), name: &job.model };
     Ok(scene::dry_run(&manifest, source, &context.options, cache, monitor)?)
 }
